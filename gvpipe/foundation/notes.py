@@ -24,11 +24,6 @@ def shape(n_frames: int, n_vertices: int) -> str:
     return f"{count(n_frames, 'frame')}, {count(n_vertices, 'vertex', 'vertices')}"
 
 
-def left_out(n_primitives: int) -> tuple[str, ...]:
-    """The note for points and lines beside the triangles."""
-    return (f"{n_primitives} of its primitives are points or lines; they were left out",) if n_primitives else ()
-
-
 def one_of_many(name: str, count: int, choice: str) -> str:
     """The note for a single file that looks like one frame of many; ``choice`` would name them all."""
     return f"{name} is 1 of {count} numbered files and was read alone; all of them are '{choice}'"

@@ -39,9 +39,9 @@ class FrameValues(NamedTuple):
         return self.values.ndim in (1, 2) and self.values.dtype.kind in "biuf" and 1 <= width <= MAX_COMPONENTS
 
 
-def left_note(names: Sequence[str]) -> tuple[str, ...]:
-    """What to say of numbers that cannot be held."""
-    return (f"numbers that are not of 1 to {MAX_COMPONENTS} components were left out: {', '.join(names[:5])}",) if names else ()
+def too_wide(names: Sequence[str]) -> tuple[str, ...]:
+    """What is said of numbers that cannot be held."""
+    return tuple(f"{name!r}, which are not numbers of 1 to {MAX_COMPONENTS} components" for name in names)
 
 
 @dataclass(frozen=True)

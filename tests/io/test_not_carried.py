@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,3 +112,58 @@ def test_numbers_that_only_later_frames_have(tmp_path: Path) -> None:
         (tmp_path / f"f{frame}.ply").write_text(head.format(more) + "\n".join([*lines, "3 0 1 2"]) + "\n")
     found = gvpipe.read(tmp_path)
     assert found.not_carried == ("heat of later frames",) and any("heat of later frames" in note for note in found.notes)
+
+
+def test_what_each_frame_of_obj_shows(tmp_path: Path) -> None:
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n")
+    head = "mtllib m.mtl\n"
+    for frame, name in enumerate("aab"):
+        (tmp_path / f"f{frame}.obj").write_text(head + SQUARE.replace("usemtl a", f"usemtl {name}"))
+    assert gvpipe.read(tmp_path).not_carried == ("materials and textures of later frames",)
+    (tmp_path / "f2.obj").write_text(head + SQUARE.replace("vt 1 1", "vt 1 0.5") + "l 1 2\n")
+    assert gvpipe.read(tmp_path).not_carried == ("uv of later frames", "statement 'l'")
+
+
+def test_what_each_frame_of_ply_shows(tmp_path: Path) -> None:
+    head = "ply\nformat ascii 1.0\ncomment TextureFile {}.png\ncomment made by hand\nobj_info num_cols 4\nelement vertex 3\n"
+    head += "".join(f"property float {name}\n" for name in ("x", "y", "z", "s", "t"))
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    for frame in range(3):
+        Image.new("RGB", (8, 8), (80 * frame, 0, 0)).save(tmp_path / f"{frame}.png")
+        rows = f"0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 {1 - frame / 4}\n3 0 1 2\n"
+        (tmp_path / f"f{frame}.ply").write_text(head.format(frame) + rows)
+    found = gvpipe.read(str(tmp_path / "f%d.ply"))
+    assert found.not_carried == ("uv of later frames", "materials and textures of later frames")
+    assert found.metadata.texts == {"comment": "made by hand", "obj_info": "num_cols 4"}
+
+
+def test_what_each_frame_of_gltf_shows(tmp_path: Path) -> None:
+    walk = gvpipe.read(scan(tmp_path))
+    for frame in range(3):
+        color = (1.0, 1.0, 1.0, 1.0) if frame < 2 else (1.0, 0.0, 0.0, 1.0)
+        uv = np.array(walk.attributes["uv"].values) / (1 + frame)
+        looks = tuple(replace(each, base_color=color) for each in walk.materials)
+        still = replace(walk, positions=walk.read(0, 1), attributes={"uv": uv}, materials=looks)
+        gvpipe.write(still, tmp_path / f"g{frame}.glb")
+    found = gvpipe.read(str(tmp_path / "g%d.glb")).not_carried
+    assert found == ("uv of later frames", "materials and textures of later frames")
+
+
+def test_options_of_material_files(tmp_path: Path) -> None:
+    Image.new("RGB", (8, 8)).save(tmp_path / "t.png")
+    said = "Ka 0 0 0\nKs 0 0 0\nillum 2\nNi 1.0\nmap_Kd -mm 0 1 -s 2 2 1 -o 0 0 0 -blendu on t.png\n"
+    (tmp_path / "m.mtl").write_text(f"newmtl a\n{said}")
+    (tmp_path / "a.obj").write_text(f"mtllib m.mtl\n{SQUARE.replace('vt 1 1', 'vt 1 1 0')}")
+    found = gvpipe.read(tmp_path / "a.obj")
+    assert found.not_carried == () and found.materials[0].ior == 1.5
+    said = "Ka 1 1 1\nKs 0.5 0 0\nillum 4\nNi 1.33\nmap_Kd -mm 0.5 2 -s 2 2 3 -t 0.1 -blendu off t.png\nmap_Ke -bm 2 t.png\n"
+    (tmp_path / "m.mtl").write_text(f"newmtl a\n{said}")
+    (tmp_path / "a.obj").write_text(f"mtllib m.mtl\n{SQUARE.replace('vt 1 1', 'vt 1 1 0.5')}")
+    found = gvpipe.read(tmp_path / "a.obj")
+    named = {"-blendu": "kd", "-bm": "ke", "-mm": "kd", "-s": "kd", "-t": "kd"}
+    options = tuple(f"option {name} of map_{of}" for name, of in named.items())
+    statements = tuple(f"material statement {name}" for name in ("illum", "ka", "ks"))
+    assert found.not_carried == ("third numbers of 'vt'", *statements, *options)
+    assert found.materials[0].ior == 1.33
+    gvpipe.write(found, tmp_path / "out.obj")
+    assert gvpipe.read(tmp_path / "out.obj").materials[0].ior == 1.33

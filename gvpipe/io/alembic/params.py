@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.io.alembic.archive import Node
 from gvpipe.io.alembic.numbers import as_integers, as_numbers
 from gvpipe.io.scene.fields import Sampled
 from gvpipe.io.scene.mesh import Layer, SceneMesh
@@ -98,6 +99,25 @@ class Values:
 
         values = as_numbers(self._param.getExpandedValue(Abc.ISampleSelector(float(time))).getVals())
         return values if self._width == 1 else values.reshape(len(values), -1)
+
+
+def left_of(node: Node) -> list[str]:
+    """What a mesh has beside positions, polygons and layers, by name."""
+    schema, left = node.schema, []
+    if schema.getVelocitiesProperty().valid():
+        left.append("velocities")
+    taken = {name for name, _, _ in _others(schema)}
+    left += [f"parameter {name}" for name in _names(schema.getArbGeomParams()) if name not in taken]
+    for each in (node, *node.parents):
+        left += [f"user property {name}" for name in _names(each.schema.getUserProperties())]
+    return left
+
+
+def _names(held: Any) -> list[str]:
+    """Names of the properties of a compound; none if it is not there."""
+    if not (held and held.valid()):
+        return []
+    return [str(held.getPropertyHeader(number).getName()) for number in range(held.getNumProperties())]
 
 
 def _others(schema: Any) -> list[tuple[str, str, Any]]:

@@ -19,11 +19,11 @@ from gvpipe.foundation.notes import DEFAULT_FPS
 from gvpipe.io.alembic.archive import Node, find_meshes, open_archive, sample_of
 from gvpipe.io.alembic.motion import AlembicMotion, around
 from gvpipe.io.alembic.numbers import as_integers
-from gvpipe.io.alembic.params import changing_normals, layers_of, sampled_of
+from gvpipe.io.alembic.params import changing_normals, layers_of, left_of, sampled_of
 from gvpipe.io.damage import reading
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene.fields import join_fields, misfit_note
+from gvpipe.io.scene.fields import join_fields, misfits
 from gvpipe.io.scene.frames import SceneFrames, even_times, first_frame_of
 from gvpipe.io.scene.hiding import hidden_note
 from gvpipe.io.scene.layers import join_layers
@@ -80,7 +80,8 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
     sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
-    misfits = misfit_note("parameters", [*(names for _, names in read), torn])
+    left.add_all(misfits("parameter", [*(names for _, names in read), torn]))
+    left.add_all(name for motion in motions for name in left_of(motion.node))
     sequence = MeshSequence(
         frames,
         joined.faces,
@@ -88,7 +89,7 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
         attributes,
         where,
         frames.origin,
-        (*notes, *time_notes, *layer_notes, *misfits),
+        (*notes, *time_notes, *layer_notes),
         fields=fields,
         parts=joined.parts,
         polygons=joined.polygons,

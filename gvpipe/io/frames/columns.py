@@ -22,7 +22,7 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.fetching import is_elsewhere
 from gvpipe.io.frames.frame_files import FrameFiles
-from gvpipe.io.mesh import FrameValues, Mesh, left_note
+from gvpipe.io.mesh import FrameValues, Mesh, too_wide
 from gvpipe.io.normals.own import FIRST_NORMALS, entries_of, own_rule
 
 SAMPLES = 3  # files that are compared with the first before all are
@@ -94,8 +94,8 @@ def split_columns(frames: FrameFiles) -> Columns:
         if name in moving - corners
     }
     attributes = {name: each for name, each in statics.items() if name not in fields}
-    notes = (*((FIRST_NORMALS,) if corners else ()), *left_note(left))
-    return Columns(attributes, fields, notes, tuple(f"{name} of later frames" for name in late))
+    notes = (FIRST_NORMALS,) if corners else ()
+    return Columns(attributes, fields, notes, (*too_wide(left), *(f"{name} of later frames" for name in late)))
 
 
 def _late_names(frames: FrameFiles, meshes: list[Mesh], known: set[str]) -> list[str]:

@@ -10,6 +10,7 @@ from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
 from gvpipe.io.frames.columns import split_columns
 from gvpipe.io.frames.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.frames.frame_files import FrameFiles
+from gvpipe.io.frames.later_looks import changing_looks
 from gvpipe.io.options import ReadOptions
 from gvpipe.model.sequence import MeshSequence
 
@@ -40,6 +41,7 @@ def read_frames(
     frames = FrameFiles(files[first_file:stop], first_file)
     first = frames.first
     columns = split_columns(frames)
+    later = changing_looks(first, files[first_file:stop])
     frames.forget_animated()
     if fps is None and len(files) > 1:
         noticed = (*noticed, ASSUMED_FPS)
@@ -57,14 +59,5 @@ def read_frames(
         first.materials,
         first.images,
         first.metadata,
-        (*first.not_carried, *columns.not_carried, *_changes(files[first_file:stop])),
+        tuple(dict.fromkeys([*first.not_carried, *columns.not_carried, *later])),
     )
-
-
-def _changes(files: Sequence[Path]) -> tuple[str, ...]:
-    """What changes from frame to frame, of formats that have more than the first frame's kept."""
-    if files[0].suffix.lower() != ".obj":
-        return ()
-    from gvpipe.io.obj.changes import changing_materials
-
-    return changing_materials(files)

@@ -80,14 +80,12 @@ class GltfMesh:
         name: ``""`` for none.
         blocks: of vertices.
         primitives: of triangles.
-        n_others: primitives of points or lines, which are left out.
         weights: ``(M,)`` of the morph targets at rest.
     """
 
     name: str
     blocks: tuple[Block, ...]
     primitives: tuple[Primitive, ...]
-    n_others: int
     weights: Float64
 
 
@@ -104,12 +102,10 @@ def read_mesh(accessors: Accessors, number: int, moving_alone: bool) -> GltfMesh
     keys: list[str] = []
     blocks: list[Block] = []
     primitives: list[Primitive] = []
-    n_others = 0
     for i, primitive in enumerate(objects(mesh, "primitives", name)):
         where = f"{name}, primitive {i}"
         mode = integer(primitive, "mode", where, TRIANGLES, 0, FAN)
         if mode < TRIANGLES:
-            n_others += 1
             continue
         if "POSITION" not in child(primitive, "attributes", where):
             continue  # nothing to draw, as the specification allows
@@ -123,7 +119,7 @@ def read_mesh(accessors: Accessors, number: int, moving_alone: bool) -> GltfMesh
         triangles = as_triangles(faces, mode, len(blocks[at].positions), where)
         primitives.append(Primitive(at, triangles, index(primitive, "material", where, n_materials)))
     n_morphs = max((len(block.morphs) for block in blocks), default=0)
-    return GltfMesh(text(mesh, "name"), tuple(blocks), tuple(primitives), n_others, read_weights(mesh, n_morphs, name))
+    return GltfMesh(text(mesh, "name"), tuple(blocks), tuple(primitives), read_weights(mesh, n_morphs, name))
 
 
 def read_weights(owner: Json, count: int, where: str) -> Float64:

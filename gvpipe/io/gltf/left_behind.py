@@ -8,26 +8,37 @@ from __future__ import annotations
 from typing import Any
 
 from gvpipe.io.gltf.attribute_names import is_taken
+from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.document import LOOKS, TAKEN, Document
-from gvpipe.io.gltf.json_fields import child, objects
+from gvpipe.io.gltf.instances import DEFAULTS, EXTENSION
+from gvpipe.io.gltf.json_fields import child, extension, integer, objects
 from gvpipe.io.gltf.looks import TAKEN_LOOKS
 from gvpipe.io.gltf.pointers import animated_property, pointer_of, shown_pointer
 from gvpipe.io.left_behind import LeftBehind
 
 MOST = 1_000_000  # values of the JSON that are looked at
+TRIANGLES = 4  # the first mode of primitives that is of triangles
 MORPHED = ("POSITION", "NORMAL")  # of morph targets
 
 
-def left_behind(document: Document) -> tuple[str, ...]:
-    """Names of what is not taken."""
+def left_behind(document: Document, in_scene: set[int]) -> tuple[str, ...]:
+    """Names of what is not taken; ``in_scene`` are the nodes of the scene that is read."""
     left = LeftBehind()
+    left.add("other scenes", len(document.items("scenes")) - 1)
+    for number, node in enumerate(document.items("nodes")):
+        left.add("meshes outside of the scene", "mesh" in node and number not in in_scene)
+        given = child(extension(node, EXTENSION, "a node"), "attributes", "a node")
+        left.add_all(f"attribute {name} of instances" for name in given if name not in DEFAULTS)
     if any("camera" in node for node in document.items("nodes")):
         left.add("cameras", len(document.items("cameras")))
-    for name, count in _extensions(document.tree).items():
+    met, n_extras = _met(document.tree)
+    left.add("extras", n_extras)
+    for name, count in met.items():
         if name not in TAKEN and name not in TAKEN_LOOKS:
             left.add(f"material extension {name}" if name.startswith(LOOKS) else f"extension {name}", count)
     for mesh in document.items("meshes"):
         for primitive in objects(mesh, "primitives", "a mesh"):
+            left.add("points and lines", integer(primitive, "mode", "a primitive", TRIANGLES) < TRIANGLES)
             names = child(primitive, "attributes", "a primitive")
             left.add_all(f"vertex attribute {name}" for name in names if not is_taken(name))
             targets = objects(primitive, "targets", "a primitive")
@@ -40,18 +51,20 @@ def left_behind(document: Document) -> tuple[str, ...]:
     return left.names
 
 
-def _extensions(tree: Any) -> dict[str, int]:
-    """How often each extension is used, wherever in the file."""
+def _met(tree: Any) -> tuple[dict[str, int], int]:
+    """How often each extension is used, wherever in the file, and how many objects have extras."""
     found: dict[str, int] = {}
-    pending, n_met = [tree], 0
+    pending, n_met, n_extras = [tree], 0, 0
     while pending and n_met < MOST:
         value = pending.pop()
         n_met += 1
         if isinstance(value, dict):
+            extras = value.get("extras")
+            n_extras += bool(set(extras) - {FPS} if isinstance(extras, dict) else extras)
             extensions = value.get("extensions")
             for name in extensions if isinstance(extensions, dict) else ():
                 found[str(name)] = found.get(str(name), 0) + 1
             pending += [each for each in value.values() if isinstance(each, dict | list)]
         elif isinstance(value, list):
             pending += [each for each in value if isinstance(each, dict | list)]
-    return found
+    return found, n_extras

@@ -14,7 +14,6 @@ import numpy as np
 from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
-from gvpipe.foundation import notes
 from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.clips import NO_CLIP, Clip, find_clip, read_clip
@@ -108,8 +107,8 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
         looks.materials,
         looks.images,
         NO_METADATA if moving_alone else _metadata(document, moves.name, moves.start),
-        () if moving_alone else (*_notes(document, shown), *hiding, *looks.notes),
-        () if moving_alone else left_behind(document),
+        () if moving_alone else (*hiding, *looks.notes),
+        () if moving_alone else left_behind(document, set(scene_order(document, nodes))),
     )
 
 
@@ -200,11 +199,3 @@ def _metadata(document: Document, clip: str, start: float) -> Metadata:
     asset = child(document.tree, "asset", "the file")
     texts = {"copyright": text(asset, "copyright"), "clip": clip}
     return Metadata("y", 1.0, start, text(asset, "generator"), {key: value for key, value in texts.items() if value})
-
-
-def _notes(document: Document, shown: list[Shown]) -> tuple[str, ...]:
-    lines = notes.left_out(sum(each.mesh.n_others for each in shown))
-    n_scenes = len(document.items("scenes"))
-    if n_scenes > 1:
-        lines += (f"it has {n_scenes} scenes; number {document.tree.get('scene', 0)}, which it shows, was read alone",)
-    return lines

@@ -14,17 +14,16 @@ from gvpipe.io.obj.lines import decode_name
 from gvpipe.io.pictures import find_beside
 
 HEAD = 1 << 13  # bytes at the top of a frame
-CHANGES = "materials and textures of later frames"
 
 
-def changing_materials(files: Sequence[Path]) -> tuple[str, ...]:
-    """What is not carried of frames whose material files differ from those of the first, by name."""
+def have_changing_materials(files: Sequence[Path]) -> bool:
+    """Whether material files of later frames differ from those of the first."""
     named = [_libraries(path) for path in files] if len(files) > 1 else []
     others = [(path, names) for path, names in zip(files[1:], named[1:], strict=True) if names and names != named[0]]
     if not others:
-        return ()
+        return False
     first = _contents(files[0], named[0])
-    return (CHANGES,) if any(_contents(path, names) != first for path, names in others) else ()
+    return any(_contents(path, names) != first for path, names in others)
 
 
 def _libraries(path: Path) -> tuple[str, ...]:

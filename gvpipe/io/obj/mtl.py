@@ -9,10 +9,11 @@
 | ``map_Pr -imfchan g``, ``map_Pm -imfchan b`` of one picture | metallic-roughness texture |
 | ``norm``, else ``map_Bump`` or ``bump`` | normal texture; ``-bm`` is its scale |
 | ``Pc``, ``Pcr``, ``Ps``, ``aniso``, ``anisor`` | clear coat and its roughness, sheen, anisotropy and its rotation |
+| ``Ni`` above 1 | index of refraction; many programs write 1, which light passes straight, and mean none |
 | ``-o``, ``-s``, ``-clamp on`` of a map | offset, tiling, wrap |
 
-``Ka``, ``Ks``, ``Ni`` and ``illum`` have no counterpart. Maps without one are named in a note, other statements among what is
-not carried.
+Whatever else a material says is named among what is not carried, if it says anything: black ``Ka`` and ``Ks``, the usual
+``illum`` of 1 or 2, and options that have their default do not.
 
 Sources: Wavefront, "Advanced Visualizer" manual, appendix B1 (MTL); the PBR extension after Clara.io's documentation.
 """
@@ -29,10 +30,15 @@ from gvpipe.io.pictures import Pictures
 NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2}  # options with up to so many numbers; others have one word
 WORDS = ("-blendu", "-blendv", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-bm", "-type", "-colorspace")
 ALIASES = {"bump": "map_bump", "map_tr": "map_d", "map_ns": "map_Ns"}
-KNOWN = {  # statements that are read, and those that nearly every file has and that have no counterpart
-    "kd", "d", "tr", "ke", "ns", "pm", "pr", "pc", "pcr", "ps", "aniso", "anisor", "ka", "ks", "ni", "illum", "sharpness",
+KNOWN = {  # statements that are read
+    "kd", "d", "tr", "ke", "ns", "pm", "pr", "pc", "pcr", "ps", "aniso", "anisor", "ni",
 }  # fmt: skip
-KNOWN_MAPS = ("map_kd", "map_d", "map_ke", "map_pr", "map_pm", "map_bump", "norm")
+DEFAULT_IOR = Material().ior
+# other statements, and what they say then
+SAYS_NOTHING = {"ka": ("0",), "ks": ("0",), "tf": ("1",), "illum": ("1", "2"), "sharpness": ("60",)}
+DEFAULTS = {
+    "-mm": (0.0, 1.0), "-t": (0.0,), "-blendu": ("on",), "-blendv": ("on",), "-boost": (0.0,), "-cc": ("off",),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -84,15 +90,19 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
     if "map_ke" in maps and not any(emissive):
         emissive = (1.0, 1.0, 1.0)
     sheen = _number(statements.get("ps", ""), 0)
-    pictures.left.add_all(f"material statement {key}" for key in statements if key not in maps and key not in KNOWN)
+    others = {key: rest for key, rest in statements.items() if key not in maps and key not in KNOWN}
+    pictures.left.add_all(f"material statement {key}" for key, rest in others.items() if _says(key, rest))
+    refraction = _number(statements.get("ni", ""), DEFAULT_IOR)
     shine = min(max(_number(statements.get("ns", ""), 0), 0), 1000)
     normal = maps.get("norm") or maps.get("map_bump")
     packed = _packed(maps.get("map_pr"), maps.get("map_pm"))
     used = {"map_kd", "map_ke", "norm", "map_bump"}
     used |= ({"map_d"} if is_cut_out else set()) | ({"map_pr", "map_pm"} if packed else set())
-    lost = sorted(key for key, one in maps.items() if key not in used and one.picture)
-    if lost:
-        pictures.notes.append(f"material {name!r}: {', '.join(lost)} has no counterpart in glTF's materials and was left out")
+    pictures.left.add_all(f"material statement {key}" for key, one in maps.items() if key not in used and one.picture)
+    for key, one in maps.items():
+        if key in used and one.picture:
+            scaled = one is normal
+            pictures.left.add_all(f"option {option} of {key}" for option in _left_options(one, scaled))
     return Material(
         name,
         (*color, min(max(alpha, 0.0), 1.0)),
@@ -109,7 +119,35 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
         sheen_color=(sheen, sheen, sheen),
         anisotropy_strength=_number(statements.get("aniso", ""), 0),
         anisotropy_rotation=2 * math.pi * _number(statements.get("anisor", ""), 0),
+        ior=refraction if refraction > 1 else DEFAULT_IOR,
     )
+
+
+def _says(key: str, rest: str) -> bool:
+    """Whether a statement without a counterpart says anything."""
+    nothing = SAYS_NOTHING.get(key, ())
+    words = [f"{_number(word, -1):g}" for word in rest.split()]
+    return not words or any(word not in nothing for word in words)
+
+
+def _left_options(one: _Map, is_normal: bool) -> list[str]:
+    """Options of a map that are not read and say something: colour ranges, turbulence, blending, third numbers, bump scale."""
+    left = []
+    for option, words in one.options.items():
+        plain = DEFAULTS.get(option)
+        if option in ("-o", "-s"):
+            says = len(words) > 2 and _number(words[2], 0) != (option == "-s")
+        elif option == "-bm":
+            says = not is_normal and _number(" ".join(words), 1) != 1
+        elif plain is None:  # of the picture's channels, size and kind
+            says = option in ("-type", "-texres")
+        elif isinstance(plain[0], str):
+            says = words != list(plain)
+        else:
+            given = [_number(word, 0) for word in words]
+            says = given != list(plain[: len(given)]) and any(given)
+        left += [option] if says else []
+    return left
 
 
 def _map(rest: str) -> _Map:

@@ -17,6 +17,7 @@ MAPS = {
     "emissive_texture": ("map_Ke",),
     "normal_texture": ("norm",),
 }
+DEFAULT_IOR = Material().ior
 
 
 def write_mtl(materials: Sequence[Material], names: Sequence[str], pictures: Sequence[str]) -> tuple[str, list[str]]:
@@ -44,6 +45,7 @@ def _statements(material: Material, pictures: Sequence[str]) -> list[str]:
         f"Pm {material.metallic!r}",
         f"d {1.0 if material.alpha_mode == 'opaque' else alpha!r}",
         "illum 2",
+        *([f"Ni {material.ior!r}"] if material.ior > 1 and material.ior != DEFAULT_IOR else []),
         *([f"Pc {material.clearcoat!r}", f"Pcr {material.clearcoat_roughness!r}"] if material.clearcoat else []),
     ]
     for role, keywords in MAPS.items():
@@ -68,7 +70,7 @@ def _options(texture: Texture, role: str) -> str:
 def _has_layers(material: Material) -> bool:
     """Whether a material has what neither glTF's own model nor a clear coat is."""
     names = [each.name for each in fields(Material)]
-    plain = {*names[: names.index("emissive_strength") + 1], "clearcoat", "clearcoat_roughness"}
+    plain = {*names[: names.index("emissive_strength") + 1], "clearcoat", "clearcoat_roughness", "ior"}
     return any(getattr(material, each.name) != each.default for each in fields(Material) if each.name not in plain)
 
 

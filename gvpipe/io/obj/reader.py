@@ -103,7 +103,7 @@ class ObjLoader:
             materials,
             images,
             animated=animated,
-            not_carried=(*lines.strange(), *left),
+            not_carried=(*lines.strange(), *lines.deep_uv(), *left),
         )
 
 

@@ -59,11 +59,11 @@ class _Element:
     properties: dict[str, _Property]
 
 
-def read_comments(data: bytes) -> list[str]:
-    """The comments of a PLY file's header."""
+def read_comments(data: bytes, keyword: str = "comment") -> list[str]:
+    """The comments of a PLY file's header, or its lines of ``obj_info``."""
     head = data[: max(0, data.find(b"end_header"))]
     lines = head.decode("utf-8", "replace").splitlines()
-    return [line.strip().removeprefix("comment").strip() for line in lines if line.startswith("comment")]
+    return [line.strip().removeprefix(keyword).strip() for line in lines if line.startswith(keyword)]
 
 
 def read_elements(data: bytes) -> dict[str, Columns]:

@@ -9,6 +9,7 @@
 | any other number of a vertex or a face | an attribute, or a field, of its name; ``a_0 a_1 a_2`` are one vector ``a`` |
 | strips of triangles (element ``tristrips``), where there are no faces | faces |
 | ``comment TextureFile picture.png`` | a material that shows the picture |
+| other comments, ``obj_info`` | texts of the metadata |
 
 A face's number is that of all triangles that the face is cut into.
 """
@@ -25,6 +26,7 @@ import numpy as np
 
 from gvpipe.asset.attribute import MAX_COMPONENTS, Attribute
 from gvpipe.asset.material import Material, Texture
+from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.io.left_behind import LeftBehind
@@ -38,6 +40,7 @@ NORMAL_NAMES = ("nx", "ny", "nz")
 INDEX_NAMES = ("vertex_indices", "vertex_index")
 COLOR_NAMES = ("red", "green", "blue", "alpha")
 TEXTURE_FILE = "TextureFile"
+LONGEST_TEXT = 1000  # characters of comments
 COMPONENT = re.compile(r"(.+)_(\d+)")
 
 Animated = dict[str, Callable[[], FrameValues]]
@@ -82,13 +85,14 @@ class PlyLoader:
             positions,
             faces,
             _uv(vertex, face, polygons.lengths, faces, len(positions)),
-            (*((f"lists {', '.join(lost)} were left out",) if lost else ()), *pictures.notes),
+            tuple(pictures.notes),
             as_polygons(polygons.lengths),
             (Part("", (0, len(positions)), (0, len(faces)), 0),) if material else (),
             material,
             tuple(pictures.images),
             animated=animated,
-            not_carried=_left_behind(elements, taken),
+            metadata=Metadata(texts=_texts(data)),
+            not_carried=(*_left_behind(elements, taken), *(f"list {name!r}" for name in lost)),
         )
 
 
@@ -119,6 +123,13 @@ def _left_behind(elements: dict[str, Columns], taken: set[str]) -> tuple[str, ..
             column = next(iter(columns.values()), np.zeros(0))
             left.add(f"element {name!r}", len(column.lengths if isinstance(column, Lists) else column))
     return left.names
+
+
+def _texts(data: bytes) -> dict[str, str]:
+    """What the header says in words, the name of the picture aside."""
+    lines = {keyword: read_comments(data, keyword) for keyword in ("comment", "obj_info")}
+    kept = {keyword: [line for line in found if line and not line.startswith(TEXTURE_FILE)] for keyword, found in lines.items()}
+    return {keyword: "; ".join(found)[:LONGEST_TEXT] for keyword, found in kept.items() if found}
 
 
 def _polygons(face: Columns) -> tuple[str, Lists]:

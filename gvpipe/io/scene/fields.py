@@ -95,7 +95,6 @@ def join_fields(
     return fields, left
 
 
-def misfit_note(what: str, names: Iterable[Iterable[str]]) -> tuple[str, ...]:
-    """The note for attributes and fields that were left out, by mesh; ``what`` is the format's word for them."""
-    left = list(dict.fromkeys(name for own in names for name in own))
-    return (f"{what} that do not fit their mesh were left out: {', '.join(left[:5])}",) if left else ()
+def misfits(what: str, names: Iterable[Iterable[str]]) -> list[str]:
+    """What is said of attributes and fields that do not fit their mesh, by mesh; ``what`` is the format's word for one."""
+    return [f"{what} {name}, which does not fit its mesh" for own in names for name in own]

@@ -15,8 +15,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gvpipe.foundation.arrays import Array
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.cells import Cells, join_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.dataset import DataArray, Dataset, only_some
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 from gvpipe.io.simulation.xml_root import parse_xml
@@ -47,10 +48,10 @@ def join_blocks(named: list[Named]) -> Dataset:
 
     point_data, left = _joined([dict(each.point_data) for each in sets])
     cell_data, more = _joined([dict(each.cell_data) for each in sets])
-    lost = [*left, *more]
-    notes = [note for each in sets for note in each.notes]
-    if lost:
-        notes.append(f"numbers that only some blocks have were left out: {', '.join(lost[:5])}")
+    lost = LeftBehind()
+    lost.add_all(only_some(name, "blocks") for name in (*left, *more))
+    for each in sets:
+        lost.add_all(each.not_carried)
     names = _unlike([name or f"block_{number}" for number, (name, _) in enumerate(named)])
     return Dataset(
         lambda: np.concatenate([each.points() for each in sets]),
@@ -58,7 +59,8 @@ def join_blocks(named: list[Named]) -> Dataset:
         point_data,
         cell_data,
         tuple((name, len(each.types)) for name, each in zip(names, pieces, strict=True)),
-        tuple(dict.fromkeys(notes)),
+        tuple(dict.fromkeys(note for each in sets for note in each.notes)),
+        lost.names,
     )
 
 

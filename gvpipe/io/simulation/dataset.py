@@ -38,7 +38,8 @@ class Dataset:
         cells: returns the cells; the same object where a file has them once for all steps.
         point_data, cell_data: numbers by name, a row per point or per cell.
         blocks: names of runs of cells and how many each has; none: one run without a name.
-        notes: what the reader left out, a line each.
+        notes: what the reader did that the user should know, a line each.
+        not_carried: what the file has and the data set has not, by name.
     """
 
     points: Callable[[], Floats]
@@ -47,6 +48,7 @@ class Dataset:
     cell_data: Mapping[str, DataArray] = field(default_factory=dict)
     blocks: tuple[tuple[str, int], ...] = ()
     notes: tuple[str, ...] = ()
+    not_carried: tuple[str, ...] = ()
 
 
 USUAL_NAMES = {"uv": "uv", "normal": "normal", "color": "color"}
@@ -87,6 +89,21 @@ def _reader(name: str, one: DataArray, domain: str, rows: Array) -> Callable[[],
         return FrameValues(values, domain, one.kind if _fits(one.kind, values) else guess(name, values), one.unit)
 
     return read
+
+
+def text_array(name: str) -> str:
+    """What is said of an array of texts."""
+    return f"text array {name!r}"
+
+
+def field_data(name: str) -> str:
+    """What is said of an array that belongs to the whole step, not to its points or cells."""
+    return f"field data {name!r}"
+
+
+def only_some(name: str, parts: str) -> str:
+    """What is said of an array that not all blocks or pieces of a step have."""
+    return f"numbers {name!r} of some {parts}"
 
 
 def plain_numbers(values: Array) -> Array:

@@ -79,8 +79,6 @@ class EnsightSteps:
         moving = [one.name for one in self._case.variables if one.per_node and one.name.lower().startswith("displ")]
         if moving:
             self.notes += (f"{moving[0]!r} was read as a field; EnSight does not say that it moves the nodes",)
-        if self._case.skipped:
-            self.notes += (f"variables of other kinds were left out: {', '.join(self._case.skipped[:5])}",)
 
     def open(self, step: int) -> Dataset:
         """A step; its variables are read when they are called for."""
@@ -91,7 +89,8 @@ class EnsightSteps:
             array = DataArray(partial(self._variable, variable, step, geometry))
             (point_data if variable.per_node else cell_data)[variable.name] = array
         blocks = tuple((part.name, sum(len(cells.types) for _, cells in part.groups)) for part in geometry.parts)
-        return Dataset(lambda: geometry.points, lambda: geometry.cells, point_data, cell_data, blocks)
+        left = tuple(f"variable {name!r}" for name in self._case.skipped)
+        return Dataset(lambda: geometry.points, lambda: geometry.cells, point_data, cell_data, blocks, not_carried=left)
 
     def _open(self, series: Series, step: int, what: str, order: str = "") -> EnsightFile:
         name, inside = self._case.place(series, step)

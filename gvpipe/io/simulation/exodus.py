@@ -39,6 +39,7 @@ LINES = ("BAR", "BEA", "TRU", "EDG", "ROD", "SPR", "SPH", "CIR", "POI")
 # Exodus has the middles of upright edges before those of the top, VTK behind
 ORDERS = {25: (*range(12), *range(16, 20), *range(12, 16)), 26: (*range(9), *range(12, 15), *range(9, 12))}
 SIZES = {5: 3, 9: 4, 10: 4, 12: 8, 13: 6, 14: 5, 22: 6, 23: 8, 24: 10, 25: 20, 26: 15, 27: 13}
+SETS = {"node": "ns_prop1", "side": "ss_prop1", "edge": "es_prop1", "face": "fs_prop1", "element": "els_prop1"}
 AXIS = re.compile(r"(.*?)_?([xyz])", re.IGNORECASE)
 MAX_BLOCKS = 100_000
 
@@ -78,6 +79,10 @@ class ExodusSteps:
         moving = [name for name, members in self._nodal.items() if name.lower().startswith("dis") and len(members) > 1]
         self._displacement = moving[0] if moving else None
         partial_names = [name for name, members in self._elemental.items() if not self._is_everywhere(members[0])]
+        self._left = (
+            *(f"{what} sets" for what, name in SETS.items() if file.has(name)),
+            *(f"global variable {name!r}" for name in _names(file, "name_glo_var")),
+        )
         self.notes: tuple[str, ...] = ()
         if moving:
             self.notes += (f"displacements {moving[0]!r} were added to positions",)
@@ -93,6 +98,7 @@ class ExodusSteps:
             {name: DataArray(partial(self._node_values, members, step)) for name, members in self._nodal.items()},
             {name: DataArray(partial(self._element_values, members, step)) for name, members in self._elemental.items()},
             blocks if len(blocks) > 1 or blocks[0][0] else (),
+            not_carried=self._left,
         )
 
     def _points(self, step: int) -> Floats:

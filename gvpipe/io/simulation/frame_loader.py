@@ -41,11 +41,11 @@ class SurfaceLoader:
         return Mesh(
             points[surface.points],
             surface.faces,
-            notes=(*step.notes, *surface.notes),
+            notes=step.notes,
             polygons=surface.polygons,
             parts=block_parts(step, surface),
             animated={name: partial(_guarded, path, name, read) for name, read in surface_values(step, surface).items()},
-            not_carried=surface.not_carried,
+            not_carried=(*step.not_carried, *surface.not_carried),
         )
 
 

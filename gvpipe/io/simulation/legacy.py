@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats, Int64
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.xml_grids import as_points, lattice
 
@@ -24,6 +25,7 @@ TYPES = {
     "unsigned_long": "u8", "long": "i8", "vtkidtype": "i4", "vtktypeint64": "i8", "vtktypeuint64": "u8", "float": "f4",
     "double": "f8", "signed_char": "i1",
 }  # fmt: skip
+TEXT_TYPES = ("string", "utf8_string")
 POLY_KINDS = {"VERTICES": 2, "LINES": 4, "POLYGONS": 7, "TRIANGLE_STRIPS": 6}
 SPACE = re.compile(rb"\s*")
 WORD = re.compile(rb"\S+")
@@ -79,6 +81,21 @@ class _Cursor:
         values = np.array(found)
         return values.astype(np.float64).astype(dtype) if dtype.kind == "f" else values.astype(np.int64).astype(dtype)
 
+    def skip_texts(self, count: int, what: str) -> None:
+        """Pass over texts: a line each, or, in binary, bytes behind their number, whose size its two highest bits say."""
+        check_bytes((count,), 1, len(self._data), what)
+        self.line()
+        for _ in range(count):
+            if not self.is_binary:
+                self.line()
+                continue
+            head = self._data[self._at : self._at + 1]
+            size = 8 >> (head[0] >> 6) if head else 1  # 3: a byte, 2: two, 1: four, 0: eight
+            held = int.from_bytes(self._data[self._at : self._at + size], "big") & ((1 << (8 * size - 2)) - 1)
+            self._at += size + held
+            if self._at > len(self._data):
+                raise ValueError(f"{what} has texts that end behind the file's end; it is cut short")
+
     def _end_of(self, count: int) -> int:
         end = self._at
         for match, _ in zip(WORD.finditer(self._data, self._at), range(count), strict=False):
@@ -107,7 +124,7 @@ class _Parsed:
     kinds: list[int] = field(default_factory=list)
     types: Array | None = None
     data: dict[str, dict[str, DataArray]] = field(default_factory=lambda: {"POINT_DATA": {}, "CELL_DATA": {}})
-    skipped: list[str] = field(default_factory=list)
+    left: LeftBehind = field(default_factory=LeftBehind)
 
 
 def load_legacy(path: Path) -> Dataset:
@@ -136,12 +153,12 @@ def load_legacy(path: Path) -> Dataset:
         elif word == "METADATA":
             _skip_metadata(cursor)
         elif where:
-            _read_data(cursor, word, rows, parsed.data[where], parsed.skipped)
+            _read_data(cursor, word, rows, parsed.data[where], parsed.left)
         elif word in GEOMETRY:
             GEOMETRY[word](cursor, parsed)
         elif word == "FIELD":
             cursor.word()
-            _read_field(cursor, {}, parsed.skipped, None)
+            _read_field(cursor, {}, parsed.left, None)
         elif word in POLY_KINDS or word == "CELLS":
             parsed.lists.append(_read_cells(cursor, word))
             parsed.kinds.append(POLY_KINDS.get(word, 0))
@@ -152,8 +169,8 @@ def load_legacy(path: Path) -> Dataset:
 
 def _as_dataset(parsed: _Parsed, kind: str) -> Dataset:
     points, cells = _points(parsed), _cells(parsed, kind)
-    notes = (f"data that are not numbers were left out: {', '.join(parsed.skipped[:5])}",) if parsed.skipped else ()
-    return Dataset(lambda: points, lambda: cells, parsed.data["POINT_DATA"], parsed.data["CELL_DATA"], notes=notes)
+    left = parsed.left.names
+    return Dataset(lambda: points, lambda: cells, parsed.data["POINT_DATA"], parsed.data["CELL_DATA"], not_carried=left)
 
 
 def _points(parsed: _Parsed) -> Floats:
@@ -254,14 +271,15 @@ GEOMETRY: dict[str, Callable[[_Cursor, _Parsed], None]] = {
 }
 
 
-def _read_data(cursor: _Cursor, word: str, rows: int, made: dict[str, DataArray], skipped: list[str]) -> None:
+def _read_data(cursor: _Cursor, word: str, rows: int, made: dict[str, DataArray], left: LeftBehind) -> None:
     """One entry behind POINT_DATA or CELL_DATA."""
     name = cursor.word()
     if word == "FIELD":
-        _read_field(cursor, made, skipped, rows)
+        _read_field(cursor, made, left, rows)
         return
     if word == "LOOKUP_TABLE":  # RGBA bytes of a palette, or floats in a text
         cursor.array("unsigned_char" if cursor.is_binary else "float", 4 * cursor.count(word), word)
+        left.add(f"lookup table {name!r}")
         return
     if word == "COLOR_SCALARS":
         width = cursor.count(word)
@@ -291,7 +309,7 @@ def _read_data(cursor: _Cursor, word: str, rows: int, made: dict[str, DataArray]
     made[name] = _held(values, {"NORMALS": "normal", "TEXTURE_COORDINATES": "uv"}.get(word, ""))
 
 
-def _read_field(cursor: _Cursor, made: dict[str, DataArray], skipped: list[str], rows: int | None) -> None:
+def _read_field(cursor: _Cursor, made: dict[str, DataArray], left: LeftBehind, rows: int | None) -> None:
     """Named arrays, each with its own number of rows; those of ``rows`` rows are kept."""
     for _ in range(cursor.count("FIELD")):
         name = cursor.word()
@@ -299,14 +317,15 @@ def _read_field(cursor: _Cursor, made: dict[str, DataArray], skipped: list[str],
             _skip_metadata(cursor)
             name = cursor.word()
         width, count, kind = cursor.count(name), cursor.count(name), cursor.word()
-        if kind == "string":
-            for _ in range(width * count):
-                cursor.line()
-            skipped.append(name)
+        if kind in TEXT_TYPES:
+            cursor.skip_texts(width * count, repr(name))
+            left.add(text_array(name))
             continue
         values = cursor.array(kind, width * count, repr(name))
         if count == rows and width:
             made[name] = _held(values.reshape(count, width), "")
+        elif count * width:
+            left.add(field_data(name) if rows is None else f"array {name!r} of {count} rows, where {rows} are needed")
 
 
 def _skip_metadata(cursor: _Cursor) -> None:

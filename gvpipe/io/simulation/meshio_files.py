@@ -60,16 +60,18 @@ class MeshioLoader:
             lambda: _cells(held.cells),
             {name: DataArray(partial(np.asarray, values)) for name, values in held.point_data.items()},
             {name: DataArray(_joined(blocks)) for name, blocks in held.cell_data.items()},
+            not_carried=held.others,
         )
 
 
 class Arrays(NamedTuple):
-    """What meshio reads of a file: points, cells by type, numbers by name (of cells for each type)."""
+    """What meshio reads of a file: points, cells by type, numbers by name (of cells for each type), and names of the rest."""
 
     points: Array
     cells: list[tuple[str, Array]]
     point_data: dict[str, Array]
     cell_data: dict[str, list[Array]]
+    others: tuple[str, ...]
 
 
 def read_by_meshio(path: Path) -> Arrays:
@@ -98,7 +100,15 @@ def read_by_meshio(path: Path) -> Arrays:
         [(block.type, np.asarray(block.data)) for block in mesh.cells],
         {name: np.asarray(values) for name, values in mesh.point_data.items()},
         {name: [np.asarray(each) for each in blocks] for name, blocks in mesh.cell_data.items()},
+        _others(mesh),
     )
+
+
+def _others(mesh: Any) -> tuple[str, ...]:
+    """What else meshio finds: sets of points and cells, and data of the whole."""
+    kinds = {"point_sets": "set of points", "cell_sets": "set of cells", "field_data": "field data"}
+    found = {kind: getattr(mesh, kind, None) or {} for kind in kinds}
+    return tuple(f"{kinds[kind]} {str(name)!r}" for kind, names in found.items() for name in names)
 
 
 def _includes(text: bytes) -> bool:

@@ -18,7 +18,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.foundation.arrays import Array, Float32, Float64, Floats
 from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.io.damage import reading
-from gvpipe.io.mesh import FrameValues, left_note
+from gvpipe.io.mesh import FrameValues, too_wide
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.surface import Surface, extract_surface
@@ -172,12 +172,12 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
         attributes,
         str(path),
         frames.origin,
-        (*notes, *frames.first.notes, *frames.surface.notes, *timing.notes, *left_note(left)),
+        (*notes, *frames.first.notes, *timing.notes),
         fields,
         block_parts(frames.first, frames.surface),
         frames.surface.polygons,
         metadata=Metadata(up, None, timing.start, path.name, timing.texts),
-        not_carried=frames.surface.not_carried,
+        not_carried=(*frames.first.not_carried, *frames.surface.not_carried, *too_wide(left), *_late_names(frames)),
     )
 
 
@@ -205,6 +205,16 @@ def _split(frames: StepFrames, where: str) -> tuple[dict[str, Attribute], dict[s
             column = StepColumn(frames, name, first.values)
             fields[name] = Field(column, first.domain, first.kind, first.unit, name=f"{where}: field {name!r}")
     return attributes, fields, left
+
+
+def _late_names(frames: StepFrames) -> list[str]:
+    """Numbers that the first frame lacks and the last has."""
+    try:
+        last = frames.open(frames.shape[0] - 1)
+        names = surface_values(last, frames.surface)
+    except InputError:  # which whoever asks for that frame gets
+        return []
+    return [f"{name} of later frames" for name in sorted(set(names) - set(frames.values))]
 
 
 def _is_still(frames: StepFrames, name: str, first: Array) -> bool:

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Bool, Floats, Int32, Int64
-from gvpipe.foundation.notes import left_out
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.io.simulation.cells import (
@@ -43,7 +42,6 @@ class Surface:
         faces: ``(T, 3) int32``.
         polygons: corners of each polygon, as of `gvpipe.MeshSequence`.
         cells: ``(T,)`` the grid's cell of each triangle, rising.
-        notes: what was left out, a line each.
         not_carried: what a surface cannot have, by name.
     """
 
@@ -51,7 +49,6 @@ class Surface:
     faces: Int32
     polygons: Int32 | None
     cells: Int64
-    notes: tuple[str, ...]
     not_carried: tuple[str, ...]
 
 
@@ -90,9 +87,8 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
     number = np.zeros(len(points), np.int64)
     number[used] = np.arange(len(used))
     faces = number[nodes][fan(counts)].astype(np.int32)
-    return Surface(
-        used, faces, as_polygons(counts), np.repeat(owners, counts - 2), _notes(cells, n_covered), _inside(cells, used)
-    )
+    left = _left_behind(cells, used, n_covered)
+    return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), left)
 
 
 def _check_types(cells: Cells) -> None:
@@ -104,17 +100,12 @@ def _check_types(cells: Cells) -> None:
         raise ValueError(f"{count} of its cells are {name}, which are not read; save its surface (Extract Surface in ParaView)")
 
 
-def _notes(cells: Cells, n_covered: int) -> tuple[str, ...]:
-    notes = left_out(int(np.isin(cells.types, list(POINTS_AND_LINES)).sum()))
-    if n_covered:
-        notes += (f"{n_covered} flat cells are faces of volume cells; they were left out",)
-    higher = int(np.isin(cells.types, list(HIGHER_ORDER)).sum())
-    return (*notes, f"{higher} cells of higher order were read by their corners") if higher else notes
-
-
-def _inside(cells: Cells, used: Int64) -> tuple[str, ...]:
-    """What is inside of volume cells, beside their surface."""
+def _left_behind(cells: Cells, used: Int64, n_covered: int) -> tuple[str, ...]:
+    """Cells that a surface has no place for, and what is inside of volume cells."""
     left = LeftBehind()
+    left.add("points and lines", int(np.isin(cells.types, list(POINTS_AND_LINES)).sum()))
+    left.add("flat cells that are faces of volume cells", n_covered)
+    left.add("curvature of cells of higher order", int(np.isin(cells.types, list(HIGHER_ORDER)).sum()))
     is_solid = np.isin(cells.types, list(VOLUMES))
     left.add("volume cells", int(is_solid.sum()))
     nodes = np.unique(cells.nodes[np.repeat(is_solid, cells.sizes)])

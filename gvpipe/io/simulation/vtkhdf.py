@@ -16,7 +16,7 @@ from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.cells import Cells, join_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
@@ -109,6 +109,7 @@ class VtkHdfSteps:
             lambda: cells,
             self._data("PointData", step, start, n_points),
             self._data("CellData", step, self._first_cell(step, first), len(cells.types)),
+            not_carried=tuple(field_data(name) for name in self._file.names(f"{self._root}/FieldData")),
         )
 
     def _sizes(self, name: str) -> Int64:

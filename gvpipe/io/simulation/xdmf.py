@@ -54,6 +54,12 @@ def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
     return read_steps(steps, path, options)
 
 
+def _others(grids: list[ElementTree.Element]) -> list[str]:
+    """What grids have beside a mesh and its numbers."""
+    found = [each for grid in grids for each in grid if each.tag in ("Set", "Information")]
+    return [f"{each.tag} {each.get('Name') or 'unnamed'!r}" for each in found]
+
+
 class XdmfSteps:
     """The time steps of a file; raises `ValueError` for what it is not."""
 
@@ -97,8 +103,8 @@ class XdmfSteps:
                 (point_data if center == "node" else cell_data)[name] = DataArray(partial(self._numbers, attribute))
             else:
                 left.append(name)
-        notes = (f"numbers of neither nodes nor cells were left out: {', '.join(left[:5])}",) if left else ()
-        return Dataset(partial(self._points, geometry), lambda: cells, point_data, cell_data, notes=notes)
+        lost = (*(f"numbers {name!r} of neither nodes nor cells" for name in left), *_others(grids))
+        return Dataset(partial(self._points, geometry), lambda: cells, point_data, cell_data, not_carried=lost)
 
     def _part(self, grid: ElementTree.Element, tag: str) -> ElementTree.Element:
         """A grid's topology or geometry, its own or that of the grid it includes."""

@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, only_some, text_array
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.xml_arrays import TYPES, VtkXml, parse_vtk_xml, read_array
@@ -45,22 +46,25 @@ def load_xml_grid(path: Path) -> Dataset:
         starts[:] = np.cumsum([0, *sizes[:-1]]).tolist()
         return join_cells([piece.cells() for piece in pieces], starts)
 
+    left = LeftBehind()
     return Dataset(
         lambda: np.concatenate([piece.points() for piece in pieces]),
         cells,
-        _joined([dict(piece.point_data) for piece in pieces]),
-        _joined([dict(piece.cell_data) for piece in pieces]),
-        notes=tuple(dict.fromkeys(note for piece in pieces for note in piece.notes)),
+        _joined([dict(piece.point_data) for piece in pieces], left),
+        _joined([dict(piece.cell_data) for piece in pieces], left),
+        not_carried=tuple(dict.fromkeys([*left.names, *(name for piece in pieces for name in piece.not_carried)])),
     )
 
 
-def _joined(found: list[dict[str, DataArray]]) -> dict[str, DataArray]:
-    """Arrays that all pieces have, one piece after the other."""
+def _joined(found: list[dict[str, DataArray]], left: LeftBehind) -> dict[str, DataArray]:
+    """Arrays that all pieces have, one piece after the other; the names of others are noted."""
 
     def read(name: str) -> Array:
         return np.concatenate([data[name].read() for data in found])
 
-    shared = [name for name in found[0] if all(name in data for data in found)]
+    every = dict.fromkeys(name for data in found for name in data)
+    shared = [name for name in every if all(name in data for data in found)]
+    left.add_all(only_some(name, "pieces") for name in every if name not in shared)
     return {name: DataArray(partial(read, name), found[0][name].kind) for name in shared}
 
 
@@ -102,9 +106,10 @@ def _open_piece(file: VtkXml, piece: ElementTree.Element) -> Dataset:
         cells = partial(structured_cells, dimensions)
     point_data, skipped = _arrays(file, piece.find("PointData"), n_points)
     cell_data, more = _arrays(file, piece.find("CellData"), n_cells)
-    left = [*skipped, *more]
-    notes = (f"texts and other arrays without numbers were left out: {', '.join(left[:5])}",) if left else ()
-    return Dataset(points, cells, point_data, cell_data, notes=notes)
+    left = LeftBehind()
+    left.add_all(text_array(name) for name in (*skipped, *more))
+    left.add_all(field_data(each.get("Name") or "unnamed") for each in file.root.findall(f"{kind}/FieldData/*"))
+    return Dataset(points, cells, point_data, cell_data, not_carried=left.names)
 
 
 def _count(piece: ElementTree.Element, name: str) -> int:

@@ -14,11 +14,14 @@ from gvpipe.io.scene.frames import first_frame_of
 from gvpipe.io.usd.instances import Instance, find_instances, is_hidden_below
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.motion import visibility_samples
+from gvpipe.io.usd.primvars import is_passed_over
 
 HIDDEN_PURPOSES = ("guide", "proxy")
 TAKEN = {  # types of prims that are read, or that only hold others
     "Xform", "Scope", "Material", "Shader", "NodeGraph", "GeomSubset", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape",
 }  # fmt: skip
+MOTION = "velocities", "accelerations"
+MATERIALS = "materialBind"  # the family of subsets that are read
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ def find_meshes(stage: Any) -> Found:
     for prim in prims:
         left.add_all(f"other variants of set {name}" for name in prim.GetVariantSets().GetNames())
         left.add_all(_animated_inputs(prim))
+        left.add_all(f"attribute {each.GetName()}" for each in prim.GetAuthoredAttributes() if each.IsCustom())
         if prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()  # what lies below is shown where its points are
             found, others = find_instances(prim, stage.GetStartTimeCode())
@@ -76,6 +80,8 @@ def find_meshes(stage: Any) -> Found:
     elif hidden:
         notes.append(f"all {len(hidden)} meshes are invisible, guides or proxies; they were read nevertheless")
     meshes = shown or hidden
+    for mesh, _ in meshes:
+        left.add_all(_left_of(mesh))
     cages = sum(mesh.GetSubdivisionSchemeAttr().Get() not in (None, "none") for mesh, _ in meshes)
     if cages:
         notes.append(f"{cages} of {len(meshes)} meshes are cages of subdivision surfaces; the cages were read as they are")
@@ -90,6 +96,17 @@ def _animated_inputs(prim: Any) -> list[str]:
         return []
     inputs = UsdShade.Shader(prim).GetInputs()
     return [f"animation of {each.GetBaseName()}" for each in inputs if each.GetAttr().ValueMightBeTimeVarying()]
+
+
+def _left_of(mesh: Any) -> list[str]:
+    """What a mesh has beside points, polygons and primvars that are read."""
+    from pxr import UsdGeom
+
+    left = [name for name in MOTION if mesh.GetPrim().GetAttribute(name).HasAuthoredValue()]
+    families = {UsdGeom.Subset(each).GetFamilyNameAttr().Get() or "" for each in UsdGeom.Subset.GetAllGeomSubsets(mesh)}
+    left += [f"subsets of family {name!r}" for name in sorted(families - {MATERIALS})]
+    primvars = UsdGeom.PrimvarsAPI(mesh.GetPrim()).FindPrimvarsWithInheritance()
+    return [*left, *(f"primvar {each.GetPrimvarName()}" for each in primvars if each.HasValue() and is_passed_over(each))]
 
 
 def _own_primvars(prim: Any) -> list[str]:

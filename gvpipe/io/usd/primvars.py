@@ -46,8 +46,8 @@ def layers_of(
         kind = "uv" if name in named_uv else _kind(primvar)
         if name.startswith("skel:") or (name in OWN and name != "displayColor") or kind is None:
             continue
-        if primvar.GetInterpolation() == "constant" and name != "displayColor":
-            continue  # settings of programs, not numbers of the surface
+        if is_passed_over(primvar):
+            continue
         if name in sampled or (name == "displayColor" and "color" in sampled):
             continue
         layer = _layer(named_uv.get(name, name), kind, primvar, polygons, time)
@@ -60,6 +60,14 @@ def layers_of(
             n_colors += 1
         layers.append(layer)
     return tuple(layers), named_uv, left
+
+
+def is_passed_over(primvar: Any) -> bool:
+    """Whether a primvar is no number of the surface: a setting of programs, one for the whole mesh, or a text."""
+    name = primvar.GetPrimvarName()
+    if name.startswith("skel:") or name in OWN:
+        return False
+    return primvar.GetInterpolation() == "constant" or _kind(primvar) is None
 
 
 def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:

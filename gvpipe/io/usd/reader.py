@@ -12,7 +12,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene.fields import join_fields, misfit_note
+from gvpipe.io.scene.fields import join_fields, misfits
 from gvpipe.io.scene.frames import SceneFrames
 from gvpipe.io.scene.hiding import hidden_note
 from gvpipe.io.scene.layers import join_layers
@@ -82,7 +82,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     taken = {name for mesh in (sampled if len(times) > 1 else []) for name in mesh}
     still = animated_primvars([found.meshes[number][0] for number in kept]) - taken
     found.left.add_all(f"animation of primvar {name}" for name in still)
-    misfits = misfit_note("primvars", [*(names for _, names in read), torn])
+    found.left.add_all(misfits("primvar", [*(names for _, names in read), torn]))
     drawn, images = materials.drawn()
     hiding = hidden_note(sum(motion.flickers for motion in motions))
     sequence = MeshSequence(
@@ -98,7 +98,6 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
             *time_notes,
             *materials.notes(),
             *layer_notes,
-            *misfits,
         ),
         fields=fields,
         parts=joined.parts,

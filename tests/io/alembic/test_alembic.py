@@ -159,3 +159,23 @@ def test_arrays_of_the_library() -> None:
         assert np.array_equal(as_numbers(colors), np.array(colors).reshape(2, width))
     matrix = imath.M44d(*map(float, range(16)))
     assert np.array_equal(as_matrix(matrix), np.arange(16).reshape(4, 4))
+
+
+def test_what_has_no_place_is_named(tmp_path: Path) -> None:
+    import imath
+    from alembic3d import Abc, AbcGeom
+
+    archive = Abc.OArchive(str(tmp_path / "a.abc"))
+    mesh = AbcGeom.OPolyMesh(archive.getTop(), "m")
+    schema = mesh.getSchema()
+    points, indices, counts = imath.V3fArray(3), imath.IntArray(3), imath.IntArray(1)
+    np.asarray(points)[...] = TRIANGLE
+    np.asarray(indices)[...] = [0, 2, 1]
+    np.asarray(counts)[...] = 3
+    sample = AbcGeom.OPolyMeshSchemaSample(points, indices, counts)
+    sample.setVelocities(points)
+    schema.set(sample)
+    Abc.OFloatProperty(schema.getUserProperties(), "mass").setValue(3.0)
+    Abc.OStringProperty(schema.getArbGeomParams(), "tag").setValue("x")
+    del archive, mesh, schema
+    assert io.read(tmp_path / "a.abc").not_carried == ("parameter tag", "user property mass", "velocities")

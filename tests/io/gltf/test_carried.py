@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_files import File
+from gltf_files import File, square_file
 from PIL import Image
 
 import gvpipe
@@ -273,3 +273,16 @@ def test_layers_that_usd_has(tmp_path: Path) -> None:
     found = gvpipe.read(tmp_path / "a.usda").materials[0]
     assert (found.clearcoat, found.clearcoat_roughness, found.ior) == (0.75, 0.25, 1.25)
     assert found.clearcoat_texture is not None and found.clearcoat_roughness_texture is None
+
+
+def test_extras_instances_and_meshes_that_no_scene_shows(tmp_path: Path) -> None:
+    file = square_file()
+    tree = file.tree
+    place = file.floats([[0, 0, 0], [3, 0, 0]])
+    heat = file.floats([1, 2])
+    given = {"attributes": {"TRANSLATION": place, "_HEAT": heat}}
+    tree["nodes"][0] |= {"extensions": {"EXT_mesh_gpu_instancing": given}, "extras": {"mass": 3}}
+    tree["nodes"].append({"mesh": 0})
+    tree["scenes"] = [{"nodes": [0]}, {"nodes": [0, 1]}]
+    found = read(file, tmp_path)
+    assert found.not_carried == ("attribute _HEAT of instances", "extras", "meshes outside of the scene", "other scenes")

@@ -48,7 +48,7 @@ def test_strips_and_fans_without_indices(tmp_path: Path, mode: int, faces: list[
     file.add("nodes", {"mesh": 0})
     read = gvpipe.read(file.write(tmp_path / "a.glb"))
     assert read.faces.tolist() == faces
-    assert read.notes == ("1 of its primitives are points or lines; they were left out",)
+    assert read.not_carried == ("points and lines",)
 
 
 def test_attributes_that_some_meshes_lack(tmp_path: Path) -> None:

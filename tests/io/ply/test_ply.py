@@ -85,7 +85,7 @@ def test_ply_binary_polygons_that_differ(tmp_path: Path, faces: list[list[int]],
     assert read.polygons is not None and read.polygons.tolist() == [len(face) for face in faces]
     assert read.faces.tolist() == faces_of(faces).tolist()
     assert np.asarray(read.attributes["flag"]).tolist() == [[7]] * len(read.faces)
-    assert read.notes == ("lists id were left out",)
+    assert read.not_carried == ("list 'id'",)
     for cut in range(1, 40):
         (tmp_path / "b.ply").write_bytes(whole[:-cut])
         with pytest.raises(InputError, match=r"b.ply cannot be read as PLY: it announces"):

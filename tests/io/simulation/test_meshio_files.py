@@ -56,7 +56,7 @@ def test_numbers_of_many_components_are_left_out(tmp_path: Path) -> None:
     meshio.write(tmp_path / "a.avs", mesh)
     read = gvpipe.io.read(tmp_path / "a.avs")
     assert "heat" in read.attributes and "wide" not in read.attributes
-    assert "numbers that are not of 1 to 64 components were left out: wide" in read.notes
+    assert "'wide', which are not numbers of 1 to 64 components" in read.not_carried
 
 
 def test_threads_share_a_process(tmp_path: Path) -> None:

@@ -81,3 +81,24 @@ def test_numbers_that_change_on_a_mesh_that_stands_still(tmp_path: Path) -> None
         tmp_path, TRIANGLE.format(name="m", more=moving).replace("point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n", "")
     )
     assert set(found.fields) == {"heat"} and found.not_carried == ()
+
+
+def test_numbers_that_have_no_place(tmp_path: Path) -> None:
+    more = """vector3f[] velocities = [(0, 0, 1), (0, 0, 1), (0, 0, 1)]
+    custom float mass = 3
+    string[] primvars:tag = ["a", "b", "c"] (interpolation = "vertex")
+    float primvars:smoothness = 2 (interpolation = "constant")
+    float[] primvars:heat = [1, 2] (interpolation = "vertex")
+    def GeomSubset "clothes" {
+        uniform token elementType = "face"
+        uniform token familyName = "outfit"
+        int[] indices = [0]
+    }"""
+    assert _read(tmp_path, TRIANGLE.format(name="m", more=more)).not_carried == (
+        "attribute mass",
+        "primvar heat, which does not fit its mesh",
+        "primvar smoothness",
+        "primvar tag",
+        "subsets of family 'outfit'",
+        "velocities",
+    )

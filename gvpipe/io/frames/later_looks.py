@@ -1,0 +1,74 @@
+"""What later frames of a series have that the first has not: materials and texture coordinates are those of the first.
+
+A few files are read as if each were the first, and compared. Material files of OBJ are compared in all frames, since scanners
+write one for each (`gvpipe.io.obj.changes`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.fetching import is_elsewhere
+from gvpipe.io.formats import FRAME_FORMATS
+from gvpipe.io.frames.frame_files import load_mesh
+from gvpipe.io.mesh import Mesh
+
+HAVE_LOOKS = (".obj", ".ply", ".gltf", ".glb")
+SAMPLES = 3  # files that are compared with the first
+COUNT = re.compile(r" \(\d+\)$")
+CHANGES = "materials and textures of later frames"
+
+
+def changing_looks(first: Mesh, files: Sequence[Path]) -> tuple[str, ...]:
+    """What is not carried of later frames, by name; files that cannot be read are passed over, since their readers say so.
+
+    Args:
+        first: the first file.
+        files: all, in frame order.
+    """
+    suffix = files[0].suffix.lower()
+    if suffix not in HAVE_LOOKS or len(files) < 2:
+        return ()
+    found = dict.fromkeys(_changing_files(files)) if suffix == ".obj" else {}
+    for number in np.unique(np.linspace(1, len(files) - 1, SAMPLES).astype(int)).tolist():
+        if is_elsewhere(files[number]):
+            continue
+        with contextlib.suppress(InputError):
+            found |= dict.fromkeys(_compared(first, load_mesh(FRAME_FORMATS[suffix].loader(), files[number], number)))
+    return tuple(found)
+
+
+def _changing_files(files: Sequence[Path]) -> tuple[str, ...]:
+    from gvpipe.io.obj.changes import have_changing_materials
+
+    return (CHANGES,) if have_changing_materials(files) else ()
+
+
+def _compared(first: Mesh, later: Mesh) -> list[str]:
+    """What differs, by name; numbers that become fields aside."""
+    names = sorted({*first.attributes, *later.attributes} - {*first.animated, *later.animated})
+    differing = [name for name in names if _as_bytes(first.attributes.get(name)) != _as_bytes(later.attributes.get(name))]
+    found = [f"{name} of later frames" for name in differing]
+    if _looks(first) != _looks(later):
+        found.append(CHANGES)
+    known = {COUNT.sub("", name) for name in first.not_carried}
+    return [*found, *(name for name in later.not_carried if COUNT.sub("", name) not in known)]
+
+
+def _looks(mesh: Mesh) -> tuple[Any, ...]:
+    """Materials, pictures, and which triangles show which."""
+    pictures = tuple(image.data for image in mesh.images)
+    return mesh.materials, pictures, tuple((part.triangles, part.material) for part in mesh.parts)
+
+
+def _as_bytes(values: Any) -> tuple[bytes, ...]:
+    """An attribute, or its plain numbers, to be compared."""
+    arrays = (getattr(values, "values", values), getattr(values, "indices", None))
+    return tuple(b"" if each is None else np.ascontiguousarray(each).tobytes() for each in arrays)
