@@ -18,8 +18,8 @@ from fuzz.mutation import mutate_bytes, mutate_json
 from fuzz.parts import BrokenPromise, Parts, Seed, Target
 from fuzz.results import check_faces, check_positions
 from gvpipe import datasets
-from gvpipe.container.bare import DICTIONARY, NO_TRACKS, RAW, START
-from gvpipe.container.bitstream import CHECKSUM, HEADER
+from gvpipe.container.bare import DICTIONARY, MAGIC, NO_TRACKS, PREFIX, RAW
+from gvpipe.container.bitstream import CHECKSUM, HEADER, VERSION
 from gvpipe.container.boxes import uuid_head
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.mp4 import BOX_UUID, file_bytes, read_file
@@ -34,7 +34,7 @@ OWN = (VIDEO_HEAD, TEXT_HEAD, TEXT, END)
 
 def split_shard(video: bytes, description: bytes) -> Parts:
     """A shard of one sample in parts: tar headers, the header of a bare video as JSON, its sections, the description."""
-    cursor = Cursor(video[len(NO_TRACKS) + len(uuid_head(BOX_UUID, 0)) + len(START) : -CHECKSUM.size], HEADER)
+    cursor = Cursor(video[len(NO_TRACKS) + len(uuid_head(BOX_UUID, 0)) + len(MAGIC) + PREFIX.size : -CHECKSUM.size], HEADER)
     header = zlib.decompressobj(RAW, zdict=DICTIONARY).decompress(cursor.block())
     sections = {name: cursor.take(length) for name, length in json.loads(header)["sections"].items()}
     heads = {name: _head(name, len(data)) for name, data in (("a.mp4", video), ("a.json", description))}
@@ -52,7 +52,9 @@ def join_shard(parts: Parts) -> dict[str, bytes]:
     """The shard of some parts."""
     deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
     header = pack_block(deflater.compress(parts[HEADER]) + deflater.flush())
-    payload = b"".join([START, header, *(data for name, data in parts.items() if name not in (*OWN, HEADER))])
+    payload = b"".join(
+        [MAGIC, PREFIX.pack(VERSION), header, *(data for name, data in parts.items() if name not in (*OWN, HEADER))]
+    )
     payload += CHECKSUM.pack(zlib.crc32(payload))
     video = NO_TRACKS + uuid_head(BOX_UUID, len(payload)) + payload
     content = [_checked(parts[VIDEO_HEAD]), _filled(video), _checked(parts[TEXT_HEAD]), _filled(parts[TEXT]), parts[END]]

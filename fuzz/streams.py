@@ -13,10 +13,10 @@ from fuzz.boxes import mutate_boxes
 from fuzz.mutation import mutate_bytes, mutate_json
 from fuzz.parts import Parts, Seed, Target
 from fuzz.videos import FILE, parse_video
-from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, PREFIX
+from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, PREFIX, VERSION
 from gvpipe.container.boxes import BOX, uuid_head
 from gvpipe.container.cursor import Cursor
-from gvpipe.container.stream_layout import COUNT, DATA_UUID, FRAGMENT, INDEX_UUID, PLACE, VERSION, WHOLE
+from gvpipe.container.stream_layout import COUNT, DATA_UUID, FRAGMENT, INDEX_UUID, PLACE, WHOLE
 from gvpipe.foundation.errors import FormatError
 
 HEAD, INDEX = "(head)", "(index)"

@@ -68,7 +68,7 @@ def load_targets(options: Options) -> list[Target]:
         refuse_bad_indices()
     videos, streams, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
     growing = load_live(Path(options.seeds))
-    shards = shard_seeds([TESTS / "golden" / f"{name}.mp4" for name in ("pca-1-kalman", "pca-2-still", "pdct-1")])
+    shards = shard_seeds([TESTS / "golden" / f"{name}.mp4" for name in ("pca-1-kalman", "pca-1-still", "pdct-1")])
     kinds = {
         "video": [*video_targets(videos), stream_target(streams), live_target(growing), shard_target(shards)],
         "mesh": mesh_targets(meshes),

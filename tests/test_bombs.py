@@ -48,7 +48,7 @@ from gvpipe.media.video import PROFILES, VideoReader
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.playback.files import read_runs
 
-WARM = ("laplacian-2-still", "mcgv-3-jpeg", "mcgv-4-rigid", "pca-2-still", "pdct-2-seams")
+WARM = ("laplacian-1-still", "mcgv-1-jpeg", "mcgv-1-rigid", "pca-1-still", "pdct-1-seams")
 ZERO = encode_integers(np.zeros(1, np.int64))  # however many zeros
 MEASURE = """
 import json, os, sys, time
@@ -118,7 +118,7 @@ def wheel() -> Bitstream:
 
 def huge_pictures() -> Bitstream:
     """JPEG images of 32000 x 32000."""
-    whole = changed("mcgv-3-jpeg")
+    whole = changed("mcgv-1-jpeg")
     video, at = bytearray(whole.video), 0
     while (at := video.find(b"\xff\xc0\x00\x0b", at + 1)) >= 0:
         video[at + 5 : at + 9] = (32000).to_bytes(2, "big") * 2
@@ -146,12 +146,12 @@ def long_clip() -> Bitstream:
 
 
 def long_transforms() -> Bitstream:
-    whole = changed("mcgv-4-rigid", n_frames=1 << 24, header={"segments": 1})
+    whole = changed("mcgv-1-rigid", n_frames=1 << 24, header={"segments": 1})
     return dataclasses.replace(whole, sections={name: data for name, data in whole.sections.items() if name != "holds"})
 
 
 def many_runs(n: int = 1 << 24) -> Bitstream:
-    return changed("pca-2-still", n_frames=n, sections={"holds": varint(n) + ZERO})
+    return changed("pca-1-still", n_frames=n, sections={"holds": varint(n) + ZERO})
 
 
 def deflated_list() -> Bitstream:
@@ -215,7 +215,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, 
         paths[name] = folder / f"{name}.mp4"
     for name, change in TABLES.items():
         paths[name] = folder / f"{name}.mp4"
-        paths[name].write_bytes(change((GOLDEN / "mcgv-4-h264.mp4").read_bytes()))
+        paths[name].write_bytes(change((GOLDEN / "mcgv-1-h264.mp4").read_bytes()))
     warm = [str(GOLDEN / f"{name}.mp4") for name in WARM]
     command = [sys.executable, "-c", MEASURE, str(len(warm)), *warm, *map(str, paths.values())]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
@@ -318,7 +318,7 @@ def test_a_file_whose_attributes_are_refused_gets_a_note(tmp_path: Path, monkeyp
 
 def test_pictures_have_a_limit() -> None:
     with pytest.raises(OverBudget, match="16000x16000"):
-        VideoReader(mp4.read_file(GOLDEN / "mcgv-4-h264.mp4").video, PROFILES["h264-8"], 16000, 16000, Budget(1000))
+        VideoReader(mp4.read_file(GOLDEN / "mcgv-1-h264.mp4").video, PROFILES["h264-8"], 16000, 16000, Budget(1000))
 
 
 def test_what_is_kept_counts_with_what_is_asked_for() -> None:

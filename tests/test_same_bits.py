@@ -43,7 +43,7 @@ for path in sys.argv[1:]:
             raise TypeError(f"{path}: a segment has no coefficients")
     print(digest.hexdigest(), os.path.basename(path))
 """
-FEW = ("laplacian-2-still", "mcgv-4-rigid", "pca-2-still", "pdct-2-still")  # all codecs, quick to compile for
+FEW = ("laplacian-1-still", "mcgv-1-rigid", "pca-1-still", "pdct-1-still")  # all codecs, quick to compile for
 MACHINES = {
     "Haswell": {"OPENBLAS_CORETYPE": "Haswell"},
     "SkylakeX": {"OPENBLAS_CORETYPE": "SkylakeX"},

@@ -156,7 +156,6 @@ class Codec(Protocol):
     version: ClassVar[int]
     summary: ClassVar[str]
     holds: ClassVar[bool]
-    holds_version: ClassVar[int | None]
     same_bits: ClassVar[bool]
     maps_segments: ClassVar[bool]
     memory_factor: ClassVar[float | None]
@@ -213,7 +212,6 @@ class BaseCodec:
     Attributes:
         holds: it never sees repeated frames: run lengths around it code them (`gvpipe.coding.repeated_frames`).
         same_bits: all machines decode the same positions, to the bit.
-        holds_version: the oldest version whose files may have such run lengths; None: this one.
         maps_segments: its segments are coded by `gvpipe.runtime.segment_map.map_segments`, which may do it elsewhere.
         memory_factor: memory that encoding a segment takes, for each byte of its positions as float32
             (`gvpipe.coding.segment_memory`); None: it takes all frames at a time.
@@ -226,7 +224,6 @@ class BaseCodec:
     version: ClassVar[int]
     summary: ClassVar[str]
     holds: ClassVar[bool] = False
-    holds_version: ClassVar[int | None] = None
     same_bits: ClassVar[bool] = True
     maps_segments: ClassVar[bool] = False
     memory_factor: ClassVar[float | None] = None
@@ -298,7 +295,6 @@ class BaseCodec:
         header: Mapping[str, Any],
         sections: Mapping[str, bytes],
         video: bytes = b"",
-        version: int | None = None,
         levels: tuple[int, ...] = (),
     ) -> Bitstream:
         """The bitstream of a sequence.
@@ -306,13 +302,12 @@ class BaseCodec:
         Args:
             sequence: that is coded.
             header, sections, video: as of `Bitstream`.
-            version: the oldest that reads it, None for the codec's own.
             levels: vertex counts of the levels of detail from level 1 on.
         """
         codec = cast("type[Codec]", type(self))
         return Bitstream(
             codec=codec.id,
-            version=codec.version if version is None else version,
+            version=codec.version,
             n_frames=sequence.n_frames,
             n_vertices=sequence.n_vertices,
             n_triangles=len(sequence.faces),

@@ -120,9 +120,7 @@ def encode_sequence(
     if holds is None:
         return codec.encode(sequence, progress, memo)
     encoded = codec.encode(holds.distinct(sequence), progress, memo)
-    oldest = codec.version if codec.holds_version is None else codec.holds_version
-    version = max(encoded.bitstream.version, oldest)
-    return Encoded(add_repeated_frames(encoded.bitstream, holds, version), encoded.permutation)
+    return Encoded(add_repeated_frames(encoded.bitstream, holds), encoded.permutation)
 
 
 def check_mapped(codecs: Codec | Sequence[Codec]) -> None:

@@ -76,17 +76,16 @@ def find_repeated_frames(sequence: MeshSequence) -> RepeatedFrames | None:
     return RepeatedFrames(np.diff(np.flatnonzero(is_new), append=sequence.n_frames))
 
 
-def add_repeated_frames(bitstream: Bitstream, repeated: RepeatedFrames, version: int) -> Bitstream:
+def add_repeated_frames(bitstream: Bitstream, repeated: RepeatedFrames) -> Bitstream:
     """Return the bitstream of the whole sequence, from that of its distinct frames.
 
     Args:
         bitstream: of the distinct frames.
         repeated: their run lengths.
-        version: of the codec that knows repeated frames.
     """
     section = varint(repeated.n_distinct) + encode_integers(repeated.lengths - 1)
     n_frames = int(repeated.lengths.sum())
-    return dataclasses.replace(bitstream, version=version, n_frames=n_frames, sections={**bitstream.sections, SECTION: section})
+    return dataclasses.replace(bitstream, n_frames=n_frames, sections={**bitstream.sections, SECTION: section})
 
 
 def read_repeated_frames(bitstream: Bitstream) -> RepeatedFrames | None:

@@ -1,4 +1,4 @@
-"""Triangles, vertex order and base-frame lattice positions of a mesh <-> bytes, exactly.
+"""Triangles and base-frame lattice positions of points <-> bytes, exactly.
 
 Draco's Edgebreaker (Rossignac, Edgebreaker: Connectivity compression for triangle meshes, 1999) carries connectivity
 and positions. Alone it is not lossless: it renumbers vertices, merges those with equal attributes, splits
@@ -8,7 +8,7 @@ does not come back from a trial decode (in the worst case everything) is sent be
 
 Mesh stream: [4 x 32 bits] Draco bytes, loose vertices, loose faces, bytes of the loose vertices; then the Draco
 stream, the loose vertices and the loose faces, each table as deflated byte planes of row differences.
-Codec order: Draco's vertices by first appearance after merging, then the loose ones. Order stream: vertex_order.py.
+Codec order: Draco's vertices by first appearance after merging, then the loose ones.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.connectivity.vertex_order import MAX_VERTICES, decode_order, encode_order, neighbour_lists, places_of
-from gvpipe.container.bitstream import Bitstream
+from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.cursor import Cursor
 from gvpipe.foundation.arrays import Array, Int32
 from gvpipe.foundation.budget import Budget
@@ -42,66 +41,60 @@ GENERIC = 4  # draco::GeometryAttribute::GENERIC
 
 @dataclass(frozen=True)
 class EncodedMesh:
+    """The streams of a mesh, and how a decoder numbers its vertices.
+
+    Args:
+        mesh: stream.
+        order: stream, empty: decode in the codec's order.
+        permutation: ``(V,) int64``: decoded vertex i is the given vertex permutation[i].
+        is_adaptive: whether adaptive contexts made a stream smaller (`welded_mesh`).
+    """
+
     mesh: bytes
-    order: bytes  # empty: decode in the codec's order
-    permutation: Array  # (V,) int64: decoded vertex i is the given vertex permutation[i]
-    is_adaptive: bool = False  # whether the mesh stream is the adaptive one of `welded_mesh`
+    order: bytes
+    permutation: Array
+    is_adaptive: bool = False
 
 
 @dataclass(frozen=True)
 class BaseMesh:
-    points: Int32  # (V, 3), lattice units
-    faces: Int32  # (T, 3)
-    visits: Array  # (V,) int64: vertex v is the codec's vertex visits[v]; the codec's order is a traversal of the surface
+    """Points ``(P, 3) int32``, lattice units, and triangles ``(T, 3) int32``, in the order of a traversal of the surface."""
+
+    points: Int32
+    faces: Int32
 
 
-def encode_base(points: Array, faces: Array, reorder: bool) -> tuple[EncodedMesh, BaseMesh]:
-    """Code lattice points (V, 3) int in [0, 2^31) and triangles (T, 3) int; return the streams and the decoder's mesh.
+def encode_base(points: Array, faces: Array) -> tuple[bytes, Array, BaseMesh]:
+    """Code lattice points ``(P, 3)`` integers in [0, 2^31) and triangles ``(T, 3)``.
 
-    `reorder` lets the decoder see the codec's vertex order. Triangles may come back in another order, and rotated.
+    Triangles may come back in another order, and rotated.
+
+    Returns:
+        The stream, the given point ``(P,)`` of each decoded one, and the mesh as decoding returns it.
     """
     points, faces = np.asarray(points), np.asarray(faces)
-    n_vertices = len(points)
-    if points.shape != (n_vertices, 3) or faces.shape != (len(faces), 3):
+    n_points = len(points)
+    if points.shape != (n_points, 3) or faces.shape != (len(faces), 3):
         raise InputError(f"points {points.shape} and faces {faces.shape}: both must have three columns")
-    if n_vertices > MAX_VERTICES:
-        raise InputError(f"{n_vertices} vertices: at most {MAX_VERTICES}")
+    if n_points > MAX_VERTICES:
+        raise InputError(f"{n_points} vertices: at most {MAX_VERTICES}")
     if points.size and (points.min() < 0 or points.max() >= 1 << 31):
         raise InputError(f"points span {points.min()}..{points.max()}: lattice coordinates lie in 0..2^31 - 1")
-    if faces.size and (faces.min() < 0 or faces.max() >= n_vertices):
-        raise InputError(f"faces index {faces.min()}..{faces.max()}, vertices are 0..{n_vertices - 1}")
+    if faces.size and (faces.min() < 0 or faces.max() >= n_points):
+        raise InputError(f"faces index {faces.min()}..{faces.max()}, vertices are 0..{n_points - 1}")
     points, faces = points.astype(np.int64), faces.astype(np.int64)
 
     try:
         mesh, permutation, codec_faces = _encode_mesh(points, faces, _encode_draco(points, _proper(points, faces)))
     except (ValueError, CorruptFile):
         mesh, permutation, codec_faces = _encode_mesh(points, faces, b"")
-    own = np.arange(n_vertices)
-    if reorder:
-        decoded = BaseMesh(points[permutation].astype(np.int32), codec_faces.astype(np.int32), own)
-        return EncodedMesh(mesh, b"", permutation), decoded
-    visits = np.argsort(permutation)
-    order = encode_order(visits, points[permutation], codec_faces)
-    decoded = BaseMesh(points.astype(np.int32), permutation[codec_faces].astype(np.int32), visits)
-    return EncodedMesh(mesh, order, own), decoded
+    return mesh, permutation, BaseMesh(points[permutation].astype(np.int32), codec_faces.astype(np.int32))
 
 
-def decode_base(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_triangles: int = 2 * MAX_VERTICES) -> BaseMesh:
+def decode_base(mesh: bytes, n_vertices: int = MAX_VERTICES, n_triangles: int = 2 * MAX_VERTICES) -> BaseMesh:
     """Mirror of `encode_base`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`."""
     points, faces = _decode_mesh(mesh, n_vertices, n_triangles)
-    visits = np.arange(len(points))
-    if order:
-        visits = decode_order(order, neighbour_lists(points, faces))
-        points, faces = points[visits], places_of(visits)[faces]
-    return BaseMesh(points.astype(np.int32), faces.astype(np.int32), visits)
-
-
-def read_base(bitstream: Bitstream) -> BaseMesh:
-    """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    keep_mesh(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)
-    base = decode_base(bitstream.section("mesh"), bitstream.section("order"), bitstream.n_vertices, bitstream.n_triangles)
-    bitstream.check_size(len(base.points), len(base.faces))
-    return base
+    return BaseMesh(points.astype(np.int32), faces.astype(np.int32))
 
 
 def keep_mesh(budget: Budget, n_vertices: int, n_triangles: int) -> None:

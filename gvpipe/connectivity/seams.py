@@ -4,10 +4,7 @@ A *point* stands for the vertices that share its trajectory; where these are sev
 is coded elsewhere (`topology_only`, `welded_mesh`). Here every corner of it names one of its point's vertices by number, and
 the user's order of vertices follows.
 
-Streams: vertices of each point less one [integers]; then one of two codings of the corners on seams:
-
-- in order of point and corner, the number's difference from that of the point's corner before [integers];
-- across edges (`edge_seams`).
+Streams: vertices of each point less one [integers]; the corners on seams, across edges (`edge_seams`).
 
 Order stream: `vertex_order`, points in place of positions, or `adaptive_order`.
 """
@@ -21,7 +18,6 @@ import numpy as np
 
 from gvpipe.connectivity import adaptive_order
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
-from gvpipe.connectivity.seam_corners import SeamCorners, are_first, find_seam_corners
 from gvpipe.connectivity.vertex_order import (
     MAX_VERTICES,
     decode_order,
@@ -31,7 +27,7 @@ from gvpipe.connectivity.vertex_order import (
     places_of,
 )
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.errors import corrupt_section
 from gvpipe.mesh.unique_rows import corners_from_smallest
 
@@ -39,7 +35,6 @@ if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph
 
 WORTHWHILE = 0.96  # of the bytes, up to which an order that adapts is chosen: it decodes more slowly
-MAX_SEAM_VERTICES = 7  # larger numbers of vertices of a point share a context
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ class CodedSeams:
 
 
 def encode_seams(
-    faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, across: bool = False, adaptive: bool = False
+    faces: Array, points: Array, point_faces: Array, n_points: int, reorder: bool, adaptive: bool = False
 ) -> CodedSeams:
     """Code which vertices the corners of ``point_faces`` use.
 
@@ -75,7 +70,6 @@ def encode_seams(
         point_faces: ``(T, 3)`` the same triangles over points, smallest point first, as the decoder will have them.
         n_points: P.
         reorder: let the decoder see the codec's vertex order.
-        across: code corners across edges (`edge_seams`).
         adaptive: the order may be coded by `adaptive_order`, where that is much smaller.
     """
     # triangles alike over points are matched in order of appearance: which is which does not matter
@@ -84,7 +78,7 @@ def encode_seams(
     matched = np.empty(len(faces), np.int64)
     matched[np.lexsort(point_faces.T[::-1])] = np.lexsort(turned.T[::-1])
     corners = np.take_along_axis(faces, corner_order, axis=1)[matched]  # vertices of the codec's triangles
-    numbers, counts, stream = _encode_corners(corners, point_faces, points, n_points, across)
+    numbers, counts, stream = _encode_corners(corners, point_faces, points, n_points)
     permutation = np.lexsort((numbers, points))
     rank = np.argsort(permutation)
     if reorder:
@@ -109,7 +103,6 @@ def decode_seams(
     order: bytes,
     point_faces: Array,
     n_points: int,
-    across: bool = False,
     adaptive: bool = False,
     *,
     n_vertices: int = MAX_VERTICES,
@@ -119,7 +112,7 @@ def decode_seams(
 
     ``adaptive``: the order is of `adaptive_order`. ``graph``: of the points, where there is one: it saves time.
     """
-    faces, points = _decode_corners(_decode_counts(counts, n_points, n_vertices), corners, point_faces, across)
+    faces, points = _decode_corners(_decode_counts(counts, n_points, n_vertices), corners, point_faces)
     if order:
         if adaptive:
             visits = adaptive_order.decode_adaptive_order(order, points, faces)
@@ -131,9 +124,7 @@ def decode_seams(
     return faces, points
 
 
-def _encode_corners(
-    corners: Array, point_faces: Array, points: Array, n_points: int, across: bool
-) -> tuple[Array, bytes, bytes]:
+def _encode_corners(corners: Array, point_faces: Array, points: Array, n_points: int) -> tuple[Array, bytes, bytes]:
     """The number ``(V,)`` of each vertex among its point's, by first use, and the streams that signal it."""
     counts = np.bincount(points, minlength=n_points)
     used, first = np.unique(corners.ravel(), return_index=True)
@@ -143,25 +134,7 @@ def _encode_corners(
     starts = np.cumsum(counts) - counts
     numbers = np.empty(len(points), np.int64)
     numbers[by_use] = np.arange(len(points)) - starts[points[by_use]]
-    if across:
-        return numbers, encode_integers(counts - 1), encode_across_edges(numbers[corners.ravel()], point_faces, counts)
-    seams = find_seam_corners(point_faces, counts)
-    differences = np.diff(numbers[corners.ravel()[seams.corners]], prepend=0)
-    contexts = _contexts(seams)
-    return numbers, encode_integers(counts - 1), encode_integers(_filled(differences, contexts, are_first(seams)), contexts)
-
-
-def _filled(differences: Array, contexts: Array, is_first: Array) -> Array:
-    """The differences, those of points' first corners replaced by what costs least: the most frequent one of their context.
-
-    A point's first corner uses its first vertex, so decoders ignore its difference.
-    """
-    result = differences.copy()
-    for context in np.unique(contexts):
-        own = contexts == context
-        values, times = np.unique(differences[own & ~is_first], return_counts=True)
-        result[own & is_first] = values[times.argmax()] if len(values) else 0
-    return result
+    return numbers, encode_integers(counts - 1), encode_across_edges(numbers[corners.ravel()], point_faces, counts)
 
 
 def _decode_counts(data: bytes, n_points: int, n_vertices: int) -> Array:
@@ -172,31 +145,15 @@ def _decode_counts(data: bytes, n_points: int, n_vertices: int) -> Array:
     return counts
 
 
-def _decode_corners(counts: Array, data: bytes, point_faces: Array, across: bool) -> tuple[Array, Array]:
+def _decode_corners(counts: Array, data: bytes, point_faces: Array) -> tuple[Array, Array]:
     """Mirror of `_encode_corners`: triangles over vertices, and the point of each vertex."""
-    numbers = decode_across_edges(data, point_faces, counts) if across else _decode_differences(data, point_faces, counts)
+    numbers = decode_across_edges(data, point_faces, counts)
     if len(numbers) and counts.max() == 1:
         return point_faces, np.arange(len(counts))
     flat = point_faces.ravel()
     starts = np.cumsum(counts) - counts
     faces: Array = (starts[flat] + numbers).reshape(-1, 3)
     return faces, np.repeat(np.arange(len(counts)), counts)
-
-
-def _decode_differences(data: bytes, point_faces: Array, counts: Array) -> Array:
-    """The number ``(3T,)`` of each corner's vertex among its point's."""
-    seams = find_seam_corners(point_faces, counts)
-    total = np.cumsum(decode_integers(data, len(seams.corners), _contexts(seams), "mesh"))
-    numbers = np.zeros(point_faces.size, np.int64)
-    numbers[seams.corners] = total - total[seams.begins]
-    if ((numbers < 0) | (numbers >= counts[seams.points])).any():
-        raise corrupt_section("mesh", "a corner uses a copy that does not exist")
-    return numbers
-
-
-def _contexts(seams: SeamCorners) -> Int64:
-    """``(n,)`` the context of each corner's difference: how many vertices its point has."""
-    return np.minimum(seams.counts[seams.points[seams.corners]], MAX_SEAM_VERTICES)
 
 
 def _as_lattice(points: Array) -> Array:

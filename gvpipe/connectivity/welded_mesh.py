@@ -3,11 +3,11 @@
 Vertices that share a trajectory are one *point*: seams, hard edges and triangle soups become the surfaces that they draw, and
 are coded once. The mesh over points, with positions, is that of `base_mesh`; `seams` signals which vertex each corner uses.
 
-Mesh stream: [varint] length, mesh of points (`base_mesh`, codec order); [varint] length, counts; corners (`seams`).
+Mesh stream: [8 bits] flags; [varint] length, mesh of points (codec order); [varint] length, counts; corners (`seams`).
 Order stream: `seams`.
 
-Adaptive mesh stream: [8 bits] flags, then the same. Flag 1: the mesh of points is of `adaptive_mesh`; 2: the order is of
-`adaptive_order`. An encoder takes them where they are smaller; where neither is, the stream is the other one.
+Flag 1: the mesh of points is of `adaptive_mesh`, else of `base_mesh`; 2: the order is of `adaptive_order`. An encoder takes
+these where they are smaller.
 """
 
 from __future__ import annotations
@@ -77,58 +77,44 @@ class WeldedMesh(PointMesh):
 
 
 def encode_points(
-    lattice: Array, faces: Array, points: Array, reorder: bool, across: bool = False, adaptive: bool = False
+    lattice: Array, faces: Array, points: Array, reorder: bool, adaptive: bool = True
 ) -> tuple[EncodedMesh, WeldedMesh]:
     """Code a mesh of ``points (V,)``, 0..P-1, at ``lattice (P, 3)`` with triangles ``faces (T, 3)`` over V vertices.
 
     Returns the streams, and the mesh as decoding returns it. ``reorder`` lets the decoder see the codec's vertex order, and
-    ``across`` codes seams across edges (`gvpipe.connectivity.edge_seams`). ``adaptive`` allows the adaptive stream. Triangles
-    may come back in another order, and rotated.
+    ``adaptive`` allows streams by adaptive contexts. Triangles may come back in another order, and rotated.
     """
     faces, points = faces.astype(np.int64), points.astype(np.int64)
     mesh, flags, permutation, base = _encode_mesh(lattice, points[faces], adaptive)
     place = np.argsort(permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
-    coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, across, adaptive)
+    coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, adaptive)
     flags |= ADAPTIVE_ORDER if coded.is_adaptive else 0
-    head = bytes([flags]) if flags else b""
-    mesh = head + pack_block(mesh) + pack_block(coded.counts) + coded.corners
+    mesh = bytes([flags]) + pack_block(mesh) + pack_block(coded.counts) + coded.corners
     decoded = WeldedMesh(base.points, point_faces.astype(np.int32), coded.faces.astype(np.int32), coded.points)
     return EncodedMesh(mesh, coded.order, coded.permutation, is_adaptive=flags > 0), decoded
 
 
 def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, int, Array, BaseMesh]:
     """The smaller mesh stream of points, its flag, the given point of each decoded one, and what a decoder has."""
-    streams, base = encode_base(lattice, faces, reorder=True)
+    plain, order, base = encode_base(lattice, faces)
     if adaptive and len(lattice) <= adaptive_mesh.MAX_POINTS:
         mesh, permutation, own = adaptive_mesh.encode_adaptive_mesh(lattice, faces)
-        if len(mesh) < (1 if len(lattice) <= FEW_POINTS else WORTH_WAITING) * len(streams.mesh):
+        if len(mesh) < (1 if len(lattice) <= FEW_POINTS else WORTH_WAITING) * len(plain):
             points = lattice[permutation].astype(np.int32)
-            return mesh, ADAPTIVE_MESH, permutation, BaseMesh(points, own.astype(np.int32), np.arange(len(points)))
-    return streams.mesh, 0, streams.permutation, base
+            return mesh, ADAPTIVE_MESH, permutation, BaseMesh(points, own.astype(np.int32))
+    return plain, 0, order, base
 
 
-def decode_points(
-    mesh: bytes,
-    order: bytes,
-    across: bool = False,
-    adaptive: bool = False,
-    n_vertices: int = MAX_VERTICES,
-    n_triangles: int = 2 * MAX_VERTICES,
-) -> WeldedMesh:
-    """Mirror of `encode_points`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`.
-
-    ``adaptive``: of an adaptive stream.
-    """
-    return _begin_points(mesh, order, across, adaptive, n_vertices, n_triangles)[1]()
+def decode_points(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_triangles: int = 2 * MAX_VERTICES) -> WeldedMesh:
+    """Mirror of `encode_points`, for a mesh of at most ``n_vertices`` and ``n_triangles``; raises `CorruptFile`."""
+    return _begin_points(mesh, order, n_vertices, n_triangles)[1]()
 
 
-def _begin_points(
-    mesh: bytes, order: bytes, across: bool, adaptive: bool, n_vertices: int, n_triangles: int
-) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
+def _begin_points(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
     """Decode the points; return these, and a function that decodes the vertices. Both raise `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
-    flags = cursor.take(1)[0] if adaptive else 0
+    flags = cursor.take(1)[0]
     if flags > ADAPTIVE_MESH + ADAPTIVE_ORDER:
         raise cursor.corrupt(f"flags {flags} are unknown")
     points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH), n_vertices, n_triangles)
@@ -139,7 +125,7 @@ def _begin_points(
     def finish() -> WeldedMesh:
         adapts, streams = bool(flags & ADAPTIVE_ORDER), (counts, corners, order)
         faces, point = decode_seams(
-            *streams, opened.point_faces, len(points), across, adapts, n_vertices=n_vertices, graph=opened.graph
+            *streams, opened.point_faces, len(points), adapts, n_vertices=n_vertices, graph=opened.graph
         )
         return WeldedMesh(opened.lattice, opened.point_faces, faces.astype(np.int32, copy=False), point)
 
@@ -150,34 +136,32 @@ def _decode_mesh(mesh: bytes, adaptive: bool, n_vertices: int, n_triangles: int)
     """Mirror of `_encode_mesh`: points ``(P, 3)`` and triangles over them."""
     if adaptive:
         return adaptive_mesh.decode_adaptive_mesh(mesh, n_vertices, n_triangles)
-    base = decode_base(mesh, b"", n_vertices, n_triangles)
+    base = decode_base(mesh, n_vertices, n_triangles)
     return base.points, base.faces
 
 
 @contextmanager
-def open_points(
-    bitstream: Bitstream, across: bool = False, adaptive: bool = False
-) -> Iterator[tuple[PointMesh, Callable[[], WeldedMesh]]]:
+def open_points(bitstream: Bitstream) -> Iterator[tuple[PointMesh, Callable[[], WeldedMesh]]]:
     """Decode the sections ``mesh`` and ``order``: give the points, and a function that waits for all of it.
 
     What needs points alone can be done meanwhile. Both raise `CorruptFile` if the sections do not hold what the header says.
     """
-    points, finish = _begin_reading(bitstream, across, adaptive)
+    points, finish = _begin_reading(bitstream)
     with beside(finish, may_run_beside(bitstream.budget, bitstream.n_vertices, bitstream.n_triangles)) as finished:
         yield points, finished
 
 
-def read_points(bitstream: Bitstream, across: bool = False, adaptive: bool = False) -> WeldedMesh:
+def read_points(bitstream: Bitstream) -> WeldedMesh:
     """Decode the sections ``mesh`` and ``order``; raises `CorruptFile` if they do not hold what the header says."""
-    return _begin_reading(bitstream, across, adaptive)[1]()
+    return _begin_reading(bitstream)[1]()
 
 
-def _begin_reading(bitstream: Bitstream, across: bool, adaptive: bool) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
+def _begin_reading(bitstream: Bitstream) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
     """As `_begin_points`, of a file; sizes are checked."""
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
     keep_mesh(bitstream.budget, n_vertices, n_triangles)
     sections = bitstream.section("mesh"), bitstream.section("order")
-    points, finish = _begin_points(*sections, across, adaptive, n_vertices, n_triangles)
+    points, finish = _begin_points(*sections, n_vertices, n_triangles)
     bitstream.check_size(n_vertices, len(points.point_faces))
 
     def checked() -> WeldedMesh:

@@ -4,7 +4,7 @@ It has no poster, no tag, no table of sections and one checksum. Programs that k
 the codec's pictures::
 
     file    = ftyp, moov, mdat, "uuid" box with the payload
-    payload = magic, [u16] 3, [varint] length of the header, header, sections one after the other, [u32] CRC-32 of all before
+    payload = magic, [u16] version, [varint] length of the header, header, sections one after the other, [u32] CRC-32 of these
     header  = a JSON object in UTF-8, deflated without head and checksum, with `DICTIONARY`
 
 The header is that of the plain layout, and ``sections`` has the length of each section by name, in order. A file of
@@ -23,11 +23,12 @@ from typing import Any
 from gvpipe.container.bitstream import (
     CHECKSUM,
     HEADER,
-    MAGIC,
     MAX_HEADER,
     MAX_SECTIONS,
     NAME,
+    VERSION,
     Bitstream,
+    check_version,
     header_values,
     parse_header,
 )
@@ -37,8 +38,8 @@ from gvpipe.container.json_object import JsonObject, unpack_json
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import TruncatedFile, corrupt
 
-VERSION = 3  # of the container
-START = MAGIC + struct.pack("<H", VERSION)
+MAGIC = b"gvbare\r\n"
+PREFIX = struct.Struct("<H")
 NO_TRACKS = BOX.pack(16, b"ftyp") + b"isom" + bytes(4) + BOX.pack(8, b"moov") + BOX.pack(8, b"mdat")
 MAX_LENGTH = 1 << 40  # of a section, bytes
 SECTIONS = "sections"
@@ -47,10 +48,10 @@ RAW = -15  # deflate without head and checksum, window of 32 KiB
 # What headers have in common, the most frequent last. Files depend on it: it never changes within a version.
 DICTIONARY = (
     b'"origin":[0.0,"predictor":"lsp","navg","weights":"delta_prediction":true,"anchors":"profile":"jpeg","h264-10",'
-    b'"outliers":true,"halves","charts","affine",{"codec":"laplacian","version":2,{"codec":"pdct","version":2,'
+    b'"outliers":true,"halves","charts","affine",{"codec":"laplacian","version":1,{"codec":"pdct","version":1,'
     b'"container":{"video_crc32":1,"track_crc32":2},"placement":"tiles","profile":"h264-8","block":16,"width":48,"height":80,'
     b'"residual_step":1e-05,"asset":"still":"holds":"anchors.0":"deltas.0":"clip.0":"charts":"pixels":'
-    b'{"codec":"mcgv","version":5,"frames":32,"vertices":"fps":24.0,"settings":{"prediction":"blended","clusters":1,"segments":1,'
+    b'{"codec":"mcgv","version":1,"frames":32,"vertices":"fps":24.0,"settings":{"prediction":"blended","clusters":1,"segments":1,'
     b'"base":[-0.0,"transform_step":0.00,"pictures":false},"sections":{"mesh":1,"order":1,"weights":2,"transforms.0":'
     b'{"codec":"pca","version":1,"frames":16,"vertices":2000,"triangles":4000,"fps":30.0,"settings":{"predictor":"kalman",'
     b'"beta":1.8,"segments":1,"steps":[0.00]},"sections":{"mesh":,"order":,"basis.0":,"coefficients.0":,"corrections":}}'
@@ -66,7 +67,7 @@ def pack_bare(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
     deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
     header = pack_block(deflater.compress(text) + deflater.flush())
-    payload = b"".join([START, header, *bitstream.sections.values()])
+    payload = b"".join([MAGIC, PREFIX.pack(VERSION), header, *bitstream.sections.values()])
     return payload + CHECKSUM.pack(zlib.crc32(payload))
 
 
@@ -74,21 +75,27 @@ def unpack_bare(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, 
     """Mirror of `pack_bare`: the bitstream without its video, and the header.
 
     Args:
-        payload: the bytes, which begin with `START`.
+        payload: the bytes, which begin with `MAGIC`.
         budget: of the file, which the bitstream carries on to its readers.
 
     Raises:
+        NewerVersion: its version is above that of the container.
         TruncatedFile: it is shorter than its shortest form.
         CorruptFile: anything else is not as written.
         OverBudget: the header inflates to more than the file may take.
     """
-    if len(payload) <= len(START) + CHECKSUM.size:
+    start = len(MAGIC) + PREFIX.size
+    if len(payload) <= start + CHECKSUM.size:
         raise TruncatedFile("the payload ends inside its header; get the file again from its source")
+    (version,) = PREFIX.unpack_from(payload, len(MAGIC))
+    check_version(version)
     content = payload[: -CHECKSUM.size]
     if CHECKSUM.unpack(payload[-CHECKSUM.size :]) != (zlib.crc32(content),):
         raise corrupt("the checksum of its payload does not match")
     cursor = Cursor(content, HEADER)
-    cursor.take(len(START))
+    cursor.take(start)
+    if version < 1:
+        raise cursor.corrupt(f"version {version}")
     inflater = zlib.decompressobj(RAW, zdict=DICTIONARY)
     header = unpack_json(cursor.block(), HEADER, MAX_HEADER, budget, inflater)
     bitstream = parse_header(header, budget)

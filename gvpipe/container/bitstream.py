@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from gvpipe.media.video import Fragments
 
 MAGIC = b"gvpipe\r\n"
-VERSION = 1
+VERSION = 1  # of all layouts
 MAX_SECTIONS = 4096
 MAX_NAME = 64
 MAX_HEADER = 1 << 20  # bytes, inflated
@@ -188,8 +188,7 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
     cursor.take(len(MAGIC))
     try:
         version, count = cursor.struct(PREFIX)
-        if version > VERSION:
-            raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+        check_version(version)
         if version < 1 or not 1 <= count <= MAX_SECTIONS:
             raise cursor.corrupt(f"version {version} with {count} sections")
         entries = []
@@ -213,13 +212,17 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
     return replace(bitstream, sections=sections), container
 
 
-def check_version(payload: bytes, newest: int) -> None:
-    """Raise `NewerVersion` for a payload of a container version above ``newest``, whatever else it is."""
+def check_version(version: int) -> None:
+    """Raise `NewerVersion` for a container version above `VERSION`."""
+    if version > VERSION:
+        raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+
+
+def check_payload_version(payload: bytes) -> None:
+    """Raise `NewerVersion` for a payload of a container version above `VERSION`, whatever else it is."""
     head = payload[: len(MAGIC) + PREFIX.size]
     if len(head) == len(MAGIC) + PREFIX.size and head.startswith(MAGIC):
-        version, _ = PREFIX.unpack(head[len(MAGIC) :])
-        if version > newest:
-            raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {newest}; upgrade gvpipe")
+        check_version(PREFIX.unpack(head[len(MAGIC) :])[0])
 
 
 def _read_sections(cursor: Cursor, entries: list[tuple[bytes, int, int]]) -> dict[str, bytes]:

@@ -15,7 +15,7 @@ from typing import IO
 
 import numpy as np
 
-from gvpipe.container.bitstream import HEADER, Bitstream, pack_header
+from gvpipe.container.bitstream import HEADER, VERSION, Bitstream, pack_header
 from gvpipe.container.boxes import BOX, UUID_BYTES, uuid_head
 from gvpipe.container.fragments import Fragment, split_fragments
 from gvpipe.container.live_layout import END, ROW_BYTES, ClipRow
@@ -26,7 +26,6 @@ from gvpipe.container.stream_layout import (
     FRAGMENT,
     INDEX_UUID,
     ROOM_UUID,
-    VERSION,
     WHOLE,
     Place,
     index_size,

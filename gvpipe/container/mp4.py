@@ -25,7 +25,15 @@ from typing import IO, TYPE_CHECKING, Any
 from uuid import UUID
 
 from gvpipe.container import bare
-from gvpipe.container.bitstream import VERSION, Bitstream, check_version, pack_header, pack_payload, unpack_payload
+from gvpipe.container.bitstream import (
+    VERSION,
+    Bitstream,
+    check_payload_version,
+    check_version,
+    pack_header,
+    pack_payload,
+    unpack_payload,
+)
 from gvpipe.container.boxes import BOX, LARGE, Box, uuid_head
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.live_layout import read_live
@@ -33,7 +41,6 @@ from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
 from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_remote, is_url
 from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
-from gvpipe.container.stream_layout import VERSION as STREAM_VERSION
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.budget import Budget
@@ -41,7 +48,6 @@ from gvpipe.foundation.errors import (
     REMEDY,
     FormatError,
     InputError,
-    NewerVersion,
     NotGeometryVideo,
     StrippedFile,
     TruncatedFile,
@@ -161,7 +167,7 @@ def load(bitstream: Bitstream) -> Bitstream:
         return bitstream
     video = b"".join([fragments.head, *(fragments.read(number) for number in range(len(fragments.counts)))])
     loaded = replace(bitstream, sections=dict(bitstream.sections), video=video, fragments=None)
-    if f"{TAG_PREFIX}{STREAM_VERSION} {_content_id(loaded)}".encode() not in fragments.head:
+    if f"{TAG_PREFIX}{VERSION} {_content_id(loaded)}".encode() not in fragments.head:
         raise corrupt("its geometry belongs to another file")
     return loaded
 
@@ -175,7 +181,7 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
     track = inspect(bitstream.video)
     extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration}
     if parts is not None:
-        video = remux_fragments(bitstream.video, f"{STREAM_VERSION} {identity}")
+        video = remux_fragments(bitstream.video, f"{VERSION} {identity}")
         return pack_stream(video, pack_header(bitstream, extra), bitstream.sections, parts)
     payload = pack_payload(bitstream, extra)
     return chain(remux(bitstream.video, f"{VERSION} {identity}"), [uuid_head(BOX_UUID, len(payload)), payload])
@@ -234,15 +240,15 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
     video = file.read(layout.video_end)
     file.seek(layout.payload[0])
     payload = file.read(layout.payload[1] - layout.payload[0])
-    if payload.startswith(bare.START):
+    if payload.startswith(bare.MAGIC):
         return _read_bare(video, layout, payload, budget, size)
-    check_version(payload, bare.VERSION)
+    check_payload_version(payload)
     check_tables(video[slice(*layout.moov)], layout.video_end)
     track = inspect(video, budget)
     tag = track.tag
     version = tag.partition(" ")[0]
-    if version.isascii() and version.isdecimal() and len(version) < 10 and int(version) > bare.VERSION:
-        raise NewerVersion(f"container version {version}, this gvpipe reads up to {bare.VERSION}; upgrade gvpipe")
+    if version.isascii() and version.isdecimal() and len(version) < 10:
+        check_version(int(version))
     bitstream, container = unpack_payload(payload, budget)
     identity = _content_id(bitstream)
     if container.text("id") != identity or (tag and tag.split()[-1] != identity):
@@ -268,7 +274,7 @@ def _check_track(container: JsonObject, track: Track) -> None:
     """Raise `CorruptFile` unless the video is the one that the header describes."""
     if container.integer("video_crc32", 0, MAX_CRC) != track.checksum:
         raise corrupt("its video is damaged, or was re-encoded")
-    if container.integer("track_crc32", 0, MAX_CRC, track.configuration) != track.configuration:
+    if container.integer("track_crc32", 0, MAX_CRC) != track.configuration:
         raise corrupt("the description of its video is damaged")
 
 

@@ -24,7 +24,19 @@ from uuid import UUID
 
 import numpy as np
 
-from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, MAX_NAME, MAX_SECTIONS, NAME, PREFIX, Bitstream, read_header
+from gvpipe.container.bitstream import (
+    CHECKSUM,
+    HEADER,
+    MAGIC,
+    MAX_NAME,
+    MAX_SECTIONS,
+    NAME,
+    PREFIX,
+    VERSION,
+    Bitstream,
+    check_version,
+    read_header,
+)
 from gvpipe.container.boxes import BOX, LONGEST_HEAD, Box, read_box, uuid_head
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.fragments import Fragment, count_pictures, split_fragments
@@ -33,9 +45,8 @@ from gvpipe.container.segments import SegmentParts
 from gvpipe.container.sources import Source
 from gvpipe.container.track import TAG_PREFIX
 from gvpipe.foundation.budget import Budget
-from gvpipe.foundation.errors import NewerVersion, TruncatedFile, corrupt, corrupt_section
+from gvpipe.foundation.errors import TruncatedFile, corrupt, corrupt_section
 
-VERSION = 2  # of the container
 INDEX_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f52")
 ROOM_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f53")  # of the index of a file that is not finished (`live_layout`)
 DATA_UUID = UUID("b9c6d1a4-52e7-4f3b-8a55-0d6e7c2f9a31")
@@ -209,8 +220,7 @@ def unpack_index(data: bytes) -> Index:
     cursor = Cursor(data, "index")
     cursor.take(len(MAGIC))
     version, count = cursor.struct(PREFIX)
-    if version > VERSION:
-        raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+    check_version(version)
     if version != VERSION or not 1 <= count <= MAX_SECTIONS:
         raise cursor.corrupt(f"version {version} with {count} sections")
     entries = []

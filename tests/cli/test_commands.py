@@ -136,7 +136,7 @@ def test_info(run: Run, video: Path, sequence: MeshSequence) -> None:
     assert {name: values["sections"][name] for name in held} == {name: len(data) for name, data in held.items()}
     assert 0 < values["sections"]["container"] < 4000
     shape = (values["frames"], values["vertices"], values["triangles"], values["fps"], values["codec"], values["version"])
-    assert shape == (11, 72, 128, 25.0, "mcgv", 5)
+    assert shape == (11, 72, 128, 25.0, "mcgv", 1)
     box, first = values["bounding_box"], sequence[0]
     assert np.array_equal(np.array([box["min"], box["max"]], np.float32), [first.min(0), first.max(0)])
     text = run("info", video).out

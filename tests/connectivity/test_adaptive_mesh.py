@@ -55,15 +55,15 @@ def test_what_recurs_costs_next_to_nothing() -> None:
 def test_welded_meshes_choose_what_is_smaller(reorder: bool) -> None:
     points, faces = sheets(9)
     vertices = np.arange(len(points))
-    coded, mesh = encode_points(points, faces, vertices, reorder, True, True)
-    plain, _ = encode_points(points, faces, vertices, reorder, True)
+    coded, mesh = encode_points(points, faces, vertices, reorder)
+    plain, _ = encode_points(points, faces, vertices, reorder, adaptive=False)
     assert coded.is_adaptive and len(coded.mesh) + len(coded.order) < len(plain.mesh) + len(plain.order)
-    decoded = decode_points(coded.mesh, coded.order, True, True)
+    decoded = decode_points(coded.mesh, coded.order)
     assert np.array_equal(decoded.lattice, mesh.lattice)
     assert np.array_equal(decoded.faces, mesh.faces)
     assert np.array_equal(decoded.lattice[decoded.point], points[coded.permutation])
     with pytest.raises(CorruptFile, match="flags 4 are unknown"):
-        decode_points(b"\x04" + coded.mesh[1:], coded.order, True, True)
+        decode_points(b"\x04" + coded.mesh[1:], coded.order)
 
 
 def test_prefixes_and_longer_streams_are_refused() -> None:

@@ -91,18 +91,13 @@ def sorted_faces(faces: Array) -> list[list[int]]:
 
 
 def check_round_trip(points: Array, faces: Array) -> None:
-    for reorder in (False, True):
-        encoded = encode_base(points, faces, reorder)[0]
-        decoded = decode_base(encoded.mesh, encoded.order)
-        decoded_points, decoded_faces = decoded.points, decoded.faces
-        assert decoded_points.dtype == decoded_faces.dtype == np.int32
-        assert sorted(encoded.permutation) == list(range(len(points)))
-        assert np.array_equal(decoded_points, points[encoded.permutation])
-        assert sorted_faces(encoded.permutation[decoded_faces]) == sorted_faces(faces)
-        if reorder:
-            assert encoded.order == b""
-        else:
-            assert np.array_equal(encoded.permutation, np.arange(len(points)))
+    mesh, permutation, own = encode_base(points, faces)
+    decoded = decode_base(mesh)
+    assert decoded.points.dtype == decoded.faces.dtype == np.int32
+    assert np.array_equal(decoded.points, own.points) and np.array_equal(decoded.faces, own.faces)
+    assert sorted(permutation) == list(range(len(points)))
+    assert np.array_equal(decoded.points, points[permutation])
+    assert sorted_faces(permutation[decoded.faces]) == sorted_faces(faces)
 
 
 @each_mesh
@@ -112,8 +107,7 @@ def test_round_trip(points: Array, faces: Array) -> None:
 
 @each_mesh
 def test_deterministic(points: Array, faces: Array) -> None:
-    first, second = encode_base(points, faces, False)[0], encode_base(points, faces, False)[0]
-    assert (first.mesh, first.order) == (second.mesh, second.order)
+    assert encode_base(points, faces)[0] == encode_base(points, faces)[0]
 
 
 @given(st.integers(1, 12), st.integers(0, 30), st.integers(0, 5), st.integers(0, 2**32 - 1))
@@ -144,15 +138,8 @@ def test_draco_result_that_differs_is_not_trusted(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "shuffled grid"])
 def test_draco_carries_whole_ordinary_meshes(name: str) -> None:
     points, faces = MESHES[name]
-    _, n_loose_points, n_loose_faces, _ = base_mesh.HEADER.unpack_from(encode_base(points, faces, True)[0].mesh)
+    _, n_loose_points, n_loose_faces, _ = base_mesh.HEADER.unpack_from(encode_base(points, faces)[0])
     assert (n_loose_points, n_loose_faces) == (0, 0)
-
-
-def test_walks_cost_little_and_random_orders_no_more_than_plain_indices() -> None:
-    points, faces = grid(60)
-    assert 8 * len(encode_base(points, faces, False)[0].order) < 1.5 * len(points)
-    points, faces = shuffled(grid(60))
-    assert 8 * len(encode_base(points, faces, False)[0].order) < (np.log2(len(points)) + 0.2) * len(points)
 
 
 @pytest.mark.parametrize(
@@ -167,7 +154,7 @@ def test_walks_cost_little_and_random_orders_no_more_than_plain_indices() -> Non
 )
 def test_encode_refuses(points: Array, faces: Array) -> None:
     with pytest.raises(InputError, match=r"lattice coordinates|faces index|three columns"):
-        encode_base(points, faces, False)[0]
+        encode_base(points, faces)
 
 
 @pytest.mark.parametrize(
@@ -175,22 +162,18 @@ def test_encode_refuses(points: Array, faces: Array) -> None:
 )
 def test_every_truncated_prefix_is_refused(name: str) -> None:
     points, faces = MESHES[name]
-    encoded = encode_base(points, faces, False)[0]
-    for n_bytes in range(len(encoded.mesh)):
+    mesh = encode_base(points, faces)[0]
+    for n_bytes in range(len(mesh)):
         with pytest.raises(CorruptFile, match="corrupt|truncated"):
-            decode_base(encoded.mesh[:n_bytes], b"")
-    for n_bytes in range(1, len(encoded.order)):
-        decode_or_refuse(encoded.mesh, encoded.order[:n_bytes])
+            decode_base(mesh[:n_bytes])
     with pytest.raises(CorruptFile, match="corrupt"):
-        decode_base(encoded.mesh + b"\0", b"")
-    with pytest.raises(CorruptFile, match="order"):
-        decode_base(encoded.mesh, encoded.order + b"\0")
+        decode_base(mesh + b"\0")
 
 
-def decode_or_refuse(mesh: bytes, order: bytes) -> None:
+def decode_or_refuse(mesh: bytes) -> None:
     """Anything is right for changed bytes (the container's checksums tell), but a valid mesh or a CorruptFile."""
     try:
-        decoded = decode_base(mesh, order)
+        decoded = decode_base(mesh)
         points, faces = decoded.points, decoded.faces
     except CorruptFile:
         return
@@ -202,33 +185,32 @@ def decode_or_refuse(mesh: bytes, order: bytes) -> None:
 @pytest.mark.parametrize("name", ["tetrahedron", "open grid", "triangle soup", "duplicated faces", "unreferenced between"])
 def test_changed_bytes_do_no_harm(name: str) -> None:
     points, faces = MESHES[name]
-    encoded = encode_base(points, faces, False)[0]
+    mesh = encode_base(points, faces)[0]
     random = np.random.default_rng(0)
     for _ in range(400):
-        for mesh, order in ((True, False), (False, True)):
-            data = bytearray(encoded.mesh if mesh else encoded.order)
-            for at in random.integers(0, len(data), random.integers(1, 4)):
-                data[at] = random.integers(256)
-            decode_or_refuse(bytes(data) if mesh else encoded.mesh, bytes(data) if order else encoded.order)
+        data = bytearray(mesh)
+        for at in random.integers(0, len(data), random.integers(1, 4)):
+            data[at] = random.integers(256)
+        decode_or_refuse(bytes(data))
 
 
-@given(st.binary(max_size=200), st.binary(max_size=200))
-def test_garbage_does_no_harm(mesh: bytes, order: bytes) -> None:
-    decode_or_refuse(mesh, order)
-    decode_or_refuse(base_mesh.HEADER.pack(len(mesh) + 11, 0, 0, 0) + base_mesh.DRACO_PREFIX + mesh, order)
+@given(st.binary(max_size=200))
+def test_garbage_does_no_harm(mesh: bytes) -> None:
+    decode_or_refuse(mesh)
+    decode_or_refuse(base_mesh.HEADER.pack(len(mesh) + 11, 0, 0, 0) + base_mesh.DRACO_PREFIX + mesh)
 
 
 @pytest.mark.parametrize("counts", [(2**32 - 1, 0, 0, 0), (0, 2**32 - 1, 0, 8), (0, 0, 2**32 - 1, 0), (0, 0, 0, 2**32 - 1)])
 def test_counts_are_refused_before_allocation(counts: tuple[int, int, int, int]) -> None:
     with pytest.raises(CorruptFile, match="corrupt|truncated"):
-        decode_base(base_mesh.HEADER.pack(*counts) + bytes(8), b"")
+        decode_base(base_mesh.HEADER.pack(*counts) + bytes(8))
 
 
 def test_draco_counts_are_refused_before_allocation() -> None:
     many = b"\xff\xff\xff\xff\x07"
     draco = base_mesh.DRACO_PREFIX + b"\0" + many + many + bytes(40)
     with pytest.raises(CorruptFile, match="vertices in Draco's stream; at most"):
-        decode_base(base_mesh.HEADER.pack(len(draco), 0, 0, 0) + draco, b"")
+        decode_base(base_mesh.HEADER.pack(len(draco), 0, 0, 0) + draco)
 
 
 def test_many_triangles_in_few_bytes_are_allowed() -> None:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from sequences import awkward, grid, patched, same_triangles
 
 from gvpipe.connectivity.base_mesh import encode_base
+from gvpipe.connectivity.edge_seam_kernels import CONTEXTS, visit_corners
+from gvpipe.connectivity.seam_corners import are_first, find_seam_corners
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.welded_mesh import WeldedMesh, decode_points, encode_points
 from gvpipe.container.cursor import varint
@@ -58,7 +60,7 @@ MESHES: dict[str, Mesh] = {
         np.array([0, 1, 2, 0, 1, 2]),
     ),
 }
-both_codings = pytest.mark.parametrize("across", [False, True], ids=["differences", "across edges"])
+both_codings = pytest.mark.parametrize("adaptive", [False, True], ids=["plain", "adaptive"])
 each_mesh = pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES.keys())
 
 
@@ -74,10 +76,10 @@ def check_mesh(decoded: WeldedMesh) -> None:
     assert len(decoded.graph.starts) == n_points + 1
 
 
-def check_round_trip(mesh: Mesh, reorder: bool, across: bool) -> None:
+def check_round_trip(mesh: Mesh, reorder: bool, adaptive: bool) -> None:
     lattice, faces, points = mesh
-    coded = encode_points(lattice, faces, points, reorder, across)[0]
-    decoded = decode_points(coded.mesh, coded.order, across)
+    coded = encode_points(lattice, faces, points, reorder, adaptive)[0]
+    decoded = decode_points(coded.mesh, coded.order)
     check_mesh(decoded)
     source = coded.permutation  # the given vertex of each decoded one
     assert np.array_equal(np.sort(source), np.arange(len(points)))
@@ -94,18 +96,18 @@ def check_round_trip(mesh: Mesh, reorder: bool, across: bool) -> None:
 @each_mesh
 @both_orders
 @both_codings
-def test_meshes_come_back(mesh: Mesh, reorder: bool, across: bool) -> None:
-    check_round_trip(mesh, reorder, across)
+def test_meshes_come_back(mesh: Mesh, reorder: bool, adaptive: bool) -> None:
+    check_round_trip(mesh, reorder, adaptive)
 
 
 @settings(max_examples=80, deadline=None)
 @given(st.integers(1, 12), st.integers(0, 25), st.integers(0, 30), st.integers(0, 2**32 - 1), st.booleans(), st.booleans())
-def test_any_triangles_come_back(n_points: int, others: int, n_faces: int, seed: int, reorder: bool, across: bool) -> None:
+def test_any_triangles_come_back(n_points: int, others: int, n_faces: int, seed: int, reorder: bool, adaptive: bool) -> None:
     """Few points, so that triangles repeat, collapse and meet at every edge."""
     draw = np.random.default_rng(seed)
     points = draw.permutation(np.r_[np.arange(n_points), draw.integers(0, n_points, others)])
     faces = draw.integers(0, len(points), (n_faces, 3))
-    check_round_trip((draw.integers(0, 3, (n_points, 3)).astype(np.int32), faces, points), reorder, across)
+    check_round_trip((draw.integers(0, 3, (n_points, 3)).astype(np.int32), faces, points), reorder, adaptive)
 
 
 def test_a_soup_costs_little_more_than_the_surface_that_it_draws() -> None:
@@ -117,28 +119,13 @@ def test_a_soup_costs_little_more_than_the_surface_that_it_draws() -> None:
     assert len(soup.mesh) < len(whole.mesh) + faces.size / 8
 
 
-def test_seams_across_edges_cost_less() -> None:
-    """Patches of three by three squares, each with vertices of its own."""
-    places, faces = grid(31)
-    lattice = np.rint(4000 * places).astype(np.int32)
-    patch = np.floor(10 * places[faces].mean(axis=1)[:, :2]) @ [1, 10]
-    corners, number = np.unique(np.c_[faces.ravel(), np.repeat(patch, 3)], axis=0, return_inverse=True)
-    points = corners[:, 0].astype(np.int64)
-    whole = len(encode_points(lattice, faces, np.arange(len(places)), reorder=True)[0].mesh)
-    before, after = (
-        len(encode_points(lattice, number.reshape(-1, 3), points, reorder=True, across=across)[0].mesh)
-        for across in (False, True)
-    )
-    assert after - whole < 0.6 * (before - whole)
-
-
 # hostile bytes
 
 
-def decode_or_refuse(mesh: bytes, order: bytes, across: bool) -> bool:
+def decode_or_refuse(mesh: bytes, order: bytes) -> bool:
     """A mesh that makes sense, or one line of CorruptFile; whether it was refused."""
     try:
-        decoded = decode_points(mesh, order, across)
+        decoded = decode_points(mesh, order)
     except CorruptFile as exc:
         assert "\n" not in str(exc)
         return True
@@ -151,23 +138,23 @@ HOSTILE = ["one triangle", "triangle soup", "non-manifold", "unreferenced vertic
 
 @pytest.mark.parametrize("name", HOSTILE)
 @both_codings
-def test_every_truncated_prefix_is_refused(name: str, across: bool) -> None:
-    coded = encode_points(*MESHES[name], reorder=False, across=across)[0]
+def test_every_truncated_prefix_is_refused(name: str, adaptive: bool) -> None:
+    coded = encode_points(*MESHES[name], reorder=False, adaptive=adaptive)[0]
     for cut in range(0, len(coded.mesh), 1 + len(coded.mesh) // 300):
         with pytest.raises(CorruptFile):
-            decode_points(coded.mesh[:cut], b"", across)
+            decode_points(coded.mesh[:cut], b"")
     with pytest.raises(CorruptFile):
-        decode_points(coded.mesh + b"\0", b"", across)
+        decode_points(coded.mesh + b"\0", b"")
     for cut in range(1, len(coded.order), 1 + len(coded.order) // 60):
-        decode_or_refuse(coded.mesh, coded.order[:cut], across)
+        decode_or_refuse(coded.mesh, coded.order[:cut])
     with pytest.raises(CorruptFile, match="order"):
-        decode_points(coded.mesh, coded.order + b"\0", across)
+        decode_points(coded.mesh, coded.order + b"\0")
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 @both_codings
-def test_changed_bytes_do_no_harm(name: str, across: bool) -> None:
-    coded = encode_points(*MESHES[name], reorder=False, across=across)[0]
+def test_changed_bytes_do_no_harm(name: str, adaptive: bool) -> None:
+    coded = encode_points(*MESHES[name], reorder=False, adaptive=adaptive)[0]
     draw = np.random.default_rng(0)
     refused = 0
     for _ in range(200):
@@ -176,17 +163,17 @@ def test_changed_bytes_do_no_harm(name: str, across: bool) -> None:
             for at in draw.integers(0, len(data), draw.integers(1, 4)):
                 data[at] = draw.integers(256)
             mesh, order = (bytes(data), coded.order) if is_mesh else (coded.mesh, bytes(data))
-            refused += decode_or_refuse(mesh, order, across)
+            refused += decode_or_refuse(mesh, order)
     assert refused > 50
 
 
-@given(st.binary(max_size=120), st.binary(max_size=60), st.booleans())
-def test_garbage_does_no_harm(data: bytes, order: bytes, across: bool) -> None:
-    decode_or_refuse(data, order, across)
-    base = encode_base(np.eye(3, dtype=np.int32), np.array([[0, 1, 2]]), reorder=True)[0].mesh
-    decode_or_refuse(varint(len(base)) + base + data, order, across)
+@given(st.binary(max_size=120), st.binary(max_size=60), st.integers(0, 3))
+def test_garbage_does_no_harm(data: bytes, order: bytes, flags: int) -> None:
+    decode_or_refuse(data, order)
+    base, head = encode_base(np.eye(3, dtype=np.int32), np.array([[0, 1, 2]]))[0], bytes([flags])
+    decode_or_refuse(head + varint(len(base)) + base + data, order)
     counts = encode_integers(np.array([0, 2, 1]))
-    decode_or_refuse(varint(len(base)) + base + varint(len(counts)) + counts + data, order, across)
+    decode_or_refuse(head + varint(len(base)) + base + varint(len(counts)) + counts + data, order)
 
 
 @pytest.mark.parametrize("counts", [[-1, 1], [1 << 24, 1], [(1 << 23), (1 << 23)], [1 << 38, 1 << 38], [-(1 << 38), 0]])
@@ -195,16 +182,22 @@ def test_numbers_of_copies_out_of_range(counts: list[int]) -> None:
         decode_seams(encode_integers(np.array(counts)), encode_integers(np.zeros(0, np.int64)), b"", np.zeros((0, 3), int), 2)
 
 
-@pytest.mark.parametrize("differences", [[0, -1], [0, 3], [0, 1, 2], [5, 2, -3], [0, 1 << 38]])
-def test_corners_of_copies_that_do_not_exist(differences: list[int]) -> None:
-    """Point 0 has three copies; a first corner's number means nothing."""
-    faces = np.tile([0, 1, 2], (len(differences), 1))
-    coded = encode_integers(np.array(differences), np.full(len(differences), 3))
+@pytest.mark.parametrize("rank", [-1, 3, 1 << 38])
+def test_corners_of_copies_that_do_not_exist(rank: int) -> None:
+    """Point 0 has three copies, and a corner's rank names one of those that it may use."""
+    faces = np.tile([0, 1, 2], (2, 1))
     with pytest.raises(CorruptFile, match="a copy that does not exist"):
-        decode_seams(encode_integers(np.array([2, 0, 0])), coded, b"", faces, 3)
-    coded = encode_integers(np.array([7, 1, 1, -2]), np.full(4, 3))
-    found, points = decode_seams(encode_integers(np.array([2, 0, 0])), coded, b"", np.tile([0, 1, 2], (4, 1)), 3)
-    assert found.tolist() == [[0, 3, 4], [1, 3, 4], [2, 3, 4], [0, 3, 4]] and points.tolist() == [0, 0, 0, 1, 2]
+        decode_seams(encode_integers(np.array([2, 0, 0])), _ranks(faces, [rank]), b"", faces, 3)
+    found, points = decode_seams(encode_integers(np.array([2, 0, 0])), _ranks(faces, [1]), b"", faces, 3)
+    assert found.tolist() == [[0, 3, 4], [1, 3, 4]] and points.tolist() == [0, 0, 0, 1, 2]
+
+
+def _ranks(faces: NDArray[np.int64], ranks: list[int]) -> bytes:
+    """The ranks of corners that are not their point's first, in the contexts that a decoder will find."""
+    seams = find_seam_corners(faces, np.array([3, 1, 1]))
+    contexts = np.zeros(len(seams.corners), np.int64)
+    visit_corners(seams, np.zeros(faces.size, np.int64), np.zeros_like(contexts), contexts, CONTEXTS)
+    return encode_integers(np.array(ranks), contexts[~are_first(seams)])
 
 
 def test_copies_are_numbered_by_first_use() -> None:

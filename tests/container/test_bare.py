@@ -14,6 +14,7 @@ from sequences import waving
 
 import gvpipe
 from gvpipe.container import bare
+from gvpipe.container.bitstream import VERSION
 from gvpipe.container.cursor import pack_block
 from gvpipe.container.mp4 import read_file
 from gvpipe.foundation.errors import CorruptFile, FormatError, NewerVersion, SettingError, TruncatedFile
@@ -106,17 +107,17 @@ def test_every_damage_is_noticed(files: tuple[Path, Path], tmp_path: Path) -> No
 def test_bad_headers_are_refused(header: bytes, message: str) -> None:
     deflater = zlib.compressobj(9, zlib.DEFLATED, bare.RAW, zdict=bare.DICTIONARY)
     packed = deflater.compress(header) + deflater.flush()
-    content = bare.START + pack_block(packed)
+    content = bare.MAGIC + bare.PREFIX.pack(VERSION) + pack_block(packed)
     with pytest.raises(CorruptFile, match=message):
         bare.unpack_bare(content + struct.pack("<I", zlib.crc32(content)))
 
 
 def test_short_and_newer_payloads(files: tuple[Path, Path], tmp_path: Path) -> None:
     with pytest.raises(TruncatedFile):
-        bare.unpack_bare(bare.START)
-    data = files[1].read_bytes().replace(bare.START, bare.START[:-2] + b"\4\0")
+        bare.unpack_bare(bare.MAGIC)
+    data = files[1].read_bytes().replace(bare.MAGIC + b"\1\0", bare.MAGIC + b"\2\0")
     (tmp_path / "a.mp4").write_bytes(data)
-    with pytest.raises(NewerVersion, match="container version 4"):
+    with pytest.raises(NewerVersion, match="container version 2"):
         read_file(tmp_path / "a.mp4")
 
 

@@ -15,7 +15,7 @@ from gvpipe.container.bitstream import unpack_payload
 from gvpipe.container.mp4 import read_file
 from gvpipe.foundation.errors import FormatError
 
-KINDS = ("mcgv-1-jpeg", "mcgv-4-klt", "pca-2-still")
+KINDS = ("mcgv-1-jpeg", "mcgv-1-klt", "pca-1-still")
 OTHERS = sorted({path.stem for path in GOLDEN.glob("*.mp4")} - set(KINDS))
 
 
@@ -36,7 +36,7 @@ def test_a_header_with_an_odd_value_is_refused_or_works(name: str) -> None:
 
 @pytest.mark.slow
 def test_an_asset_with_an_odd_value_is_refused_or_works() -> None:
-    whole = read_file(GOLDEN / "pdct-2-asset.mp4")
+    whole = read_file(GOLDEN / "pdct-1-asset.mp4")
     for what, text in odd_texts(json.loads(zlib.decompress(whole.section("asset")))):
         changed = {**whole.sections, "asset": zlib.compress(text.encode())}
         try:
@@ -48,7 +48,7 @@ def test_an_asset_with_an_odd_value_is_refused_or_works() -> None:
 
 
 def test_numbers_of_the_container_are_numbers() -> None:
-    whole = read_file(GOLDEN / "pca-2-still.mp4")
+    whole = read_file(GOLDEN / "pca-1-still.mp4")
     for value in ('{"id": 3}', '{"video_crc32": 1}', "[]", "null"):
         header = json.dumps({**header_of(whole), "container": "here"}).replace('"here"', value)
         with pytest.raises(FormatError, match="header"):

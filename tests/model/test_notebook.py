@@ -26,7 +26,7 @@ def test_html(sequence: MeshSequence, video: Path, frames: Any) -> None:
     for words in ("<td", "72", "128", "11 at 25 per second, 0.44 s"):
         assert words in text
     size = f"{video.stat().st_size} bytes"
-    assert (size in text and "mcgv version 5" in text) == isinstance(frames, gvpipe.Player)
+    assert (size in text and "mcgv version 1" in text) == isinstance(frames, gvpipe.Player)
 
 
 def test_html_of_what_cannot_be_painted_or_is_gone(video: Path) -> None:

@@ -20,9 +20,9 @@ from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.entropy.integers import encode_integers
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None or sys.platform == "win32", reason="no Node")
-WHOLE = GOLDEN / "mcgv-4-h264.mp4"
+WHOLE = GOLDEN / "mcgv-1-h264.mp4"
 ZERO = encode_integers(np.zeros(1, np.int64))  # however many zeros
-RIGID = GOLDEN / "mcgv-4-rigid.mp4"
+RIGID = GOLDEN / "mcgv-1-rigid.mp4"
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def deflated_triangles(whole: Bitstream) -> Bitstream:
     n = 5 << 20
     loose = zlib.compress(bytes(12 * n), 9)
     mesh = b"".join(number.to_bytes(4, "little") for number in (0, 0, n, 0)) + loose
-    return dataclasses.replace(whole, sections={**whole.sections, "mesh": pack_block(mesh) + pack_block(b"")})
+    return dataclasses.replace(whole, sections={**whole.sections, "mesh": b"\0" + pack_block(mesh) + pack_block(b"")})
 
 
 def many_runs(whole: Bitstream) -> Bitstream:
@@ -85,7 +85,7 @@ BOMBS: dict[str, tuple[Path, Callable[[Bitstream], Bitstream], str]] = {
     "long transforms": (RIGID, long_transforms, "16384 trajectories"),
     "a long clip": (GOLDEN / "pdct-1.mp4", long_clip, "100000 frames of"),
     "many frames": (GOLDEN / "pca-1-rbf.mp4", many_frames, "12000000 frames"),
-    "wide pictures": (GOLDEN / "mcgv-5-klt.mp4", wide_pictures, "pictures of segment 0"),
+    "wide pictures": (GOLDEN / "mcgv-1-klt.mp4", wide_pictures, "pictures of segment 0"),
     "a deflated list": (WHOLE, deflated_list, "inflates to more"),
 }
 

@@ -35,7 +35,7 @@ from gvcodecs.laplacian.header import (
     MAX_SPACING,
     MOST_POWER,
     MOST_RATIO,
-    VERSION_STILL,
+    VERSION,
     CoefficientCoding,
     Header,
 )
@@ -72,7 +72,7 @@ class Laplacian(BaseCodec):
     """
 
     id: ClassVar[str] = "laplacian"
-    version: ClassVar[int] = VERSION_STILL
+    version: ClassVar[int] = VERSION
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
@@ -155,7 +155,7 @@ class Laplacian(BaseCodec):
         steps = tuple(each.step for each in coded)
         report("segments", 1)
         header = Header(start.coding, n_segments, steps or (1.0,) * n_segments)
-        bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if SECTION in sections else 1)
+        bitstream = self._bitstream(sequence, header.to_json(), sections)
         encoded = Encoded(bitstream, start.shared.coded.permutation)
         return StepTrial(encoded, asked, math.sqrt(squared / (sequence.n_frames * sequence.n_vertices)))
 

@@ -9,8 +9,7 @@
 ``deltas.N``          delta trajectories of the other points (`gvpipe.trajectory.coefficient_coding`, `delta_rows`)
 ====================  ======================================================================================
 
-Version 1 has no section ``still``; files without one are still written as version 1. Where no point moves, segments have no
-sections.
+Where no point moves, segments have no sections.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import read_segments, read_steps
 
 MAX_SEGMENTS = 1300  # three sections each, of the 4096 that a bitstream may have
-VERSION_STILL = 2  # of files with a section `still` or `holds`
+VERSION = 1  # of this layout
 MAX_SPACING = 1 << 20  # points per anchor
 LEAST_RATIO, MOST_RATIO = 2.0**-10, 2.0**10  # of steps
 FINEST, COARSEST = 2.0**-20, 1.0  # step of the average, mean edge lengths

@@ -15,13 +15,8 @@
 ``trajectories.N`` klt, in place of ``transforms.N``: principal trajectories of segment N (`pictures.trajectories`)
 =================  ==========================================================================================
 
-Files of version 5 may code ``mesh`` and ``order`` by adaptive contexts.
-
-Files without pictures (from version 4 on) have ``mesh``, ``order``, ``still``, ``weights`` and ``transforms.N`` alone. Their
-header's key ``pictures`` is false, and nothing in it tells of pictures.
-
-Slots are the points that move (`surface`). In versions 1 and 2 every vertex is a slot, ``mesh`` and ``order`` are those of
-`gvpipe.connectivity.base_mesh`, and there is no section ``still``. Version 1 knows affine prediction and charts alone.
+Files without pictures have ``mesh``, ``order``, ``still``, ``weights`` and ``transforms.N`` alone. Their header's key
+``pictures`` is false, and nothing in it tells of pictures. Slots are the points that move (`surface`).
 
 Source: Mamou, Zaharia and Preteux, "Multi-Chart Geometry Video", 2007, section 3.3: base frame, partition, parametric
 coordinates, transforms, images. With charts the affine partition follows from the pixels, since no block holds two of them;
@@ -33,19 +28,52 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.connectivity.lattice_field import read_lattice
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.segments import HUGE, TINY
+from gvpipe.container.segments import HUGE, TINY, count_longest, read_steps
 from gvpipe.foundation.errors import CorruptFile
 from gvpipe.media.video import MAX_SIDE, PROFILES, Profile
 from gvpipe.mesh.lattice import Lattice
+from gvpipe.trajectory.basis import MAX_COMPONENTS
 
+VERSION = 1  # of this layout
 PREDICTIONS = ("blended", "affine")
 PLACEMENTS = ("halves", "charts", "tiles")
 OF_PICTURES = ("placement", "profile", "block", "width", "height", "residual_step")  # keys of files that have some
 MAX_CLUSTERS = 1024
 MAX_SEGMENTS = 1 << 16
+TRANSFORMS = ("none", "klt")
+MAX_FINENESS = 256
+
+
+@dataclass(frozen=True)
+class TrajectoryHeader:
+    """What a header says of trajectory images (`pictures.trajectories`) in place of a frame's steps; one entry per segment.
+
+    Args:
+        fineness: levels per step.
+        components: R, principal trajectories.
+        steps: D, model units.
+    """
+
+    fineness: int
+    components: tuple[int, ...]
+    steps: tuple[float, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fields as JSON values."""
+        return {"transform": "klt", "fineness": self.fineness, "components": list(self.components), "steps": list(self.steps)}
+
+    @classmethod
+    def of(cls, bitstream: Bitstream, segments: int) -> TrajectoryHeader | None:
+        """Mirror of `to_json`, None where pictures are frames; raises `CorruptFile` for values out of range."""
+        if "transform" not in bitstream.header:
+            return None
+        fields = bitstream.fields
+        fields.choice("transform", TRANSFORMS[1:])
+        most = min(MAX_COMPONENTS, 3 * count_longest(bitstream.n_frames, segments))
+        components = fields.integers("components", segments, 0, most)
+        return cls(fields.integer("fineness", 1, MAX_FINENESS), components, read_steps(bitstream, segments))
 
 
 @dataclass(frozen=True)
@@ -106,9 +134,7 @@ class Header:
         if "pictures" in bitstream.header:
             return cls._without_pictures(bitstream)
         fields = bitstream.fields
-        prediction, placement = "affine", "charts"
-        if bitstream.version > 1:
-            prediction, placement = fields.choice("prediction", PREDICTIONS), fields.choice("placement", PLACEMENTS)
+        prediction, placement = fields.choice("prediction", PREDICTIONS), fields.choice("placement", PLACEMENTS)
         if placement == "tiles" and prediction != "blended":
             raise fields.wrong("placement", "another one with prediction affine")
         profile = PROFILES[fields.choice("profile", tuple(PROFILES))]
@@ -129,7 +155,7 @@ class Header:
             outliers=fields.flag("outliers"),
             images=images,
         )
-        if "outliers" in fields and (not header.outliers or bitstream.version == 1 or images):
+        if "outliers" in fields and (not header.outliers or images):
             raise fields.wrong("outliers", "none in such a file")
         if images and (prediction != "blended" or profile.codec != "h264"):
             raise fields.wrong("transform", f"none with prediction {prediction} and profile {profile.name}")
@@ -143,7 +169,7 @@ class Header:
     def _without_pictures(cls, bitstream: Bitstream) -> Header:
         fields = bitstream.fields
         alien = [key for key in (*OF_PICTURES, "outliers", "transform") if key in bitstream.header]
-        if fields.flag("pictures") or bitstream.version < 4 or alien:
+        if fields.flag("pictures") or alien:
             raise fields.wrong("pictures", f"none of {', '.join(alien) or 'it in such a file'}")
         return cls(
             prediction=fields.choice("prediction", ("blended",)),

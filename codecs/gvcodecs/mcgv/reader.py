@@ -13,8 +13,6 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import SegmentParts, numbered_parts, segment_starts
 from gvpipe.media.video import PROFILES
 
-BROWSER_VERSION = 5  # the highest that gvpipe/web/src/mcgv reads
-
 
 def open_reader(bitstream: Bitstream) -> FrameReader:
     """Open an ``mcgv`` bitstream; raises `CorruptFile` where a section does not hold what it must."""
@@ -37,8 +35,6 @@ def segment_parts(bitstream: Bitstream) -> SegmentParts:
 def browser_obstacle(bitstream: Bitstream) -> str:
     """Return what of an ``mcgv`` bitstream keeps browsers from playing it, in a few words; ``""`` if they play it."""
     header = bitstream.header
-    if bitstream.version > BROWSER_VERSION:
-        return f"{bitstream.codec}, version {bitstream.version}"
     if header.get("pictures") is False or header.get("profile") in PROFILES:
         return ""
     return f"{bitstream.codec}, profile {header.get('profile')}"

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from gvcodecs.mcgv.header import MAX_CLUSTERS, PLACEMENTS, PREDICTIONS
-from gvcodecs.mcgv.trajectory_header import TRANSFORMS
+from gvcodecs.mcgv.header import MAX_CLUSTERS, PLACEMENTS, PREDICTIONS, TRANSFORMS, VERSION
 from gvpipe.coding.codec import BaseCodec
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT
@@ -31,8 +30,7 @@ class Settings(BaseCodec):
     """
 
     id: ClassVar[str] = "mcgv"
-    version: ClassVar[int] = 5
-    holds_version: ClassVar[int | None] = 3  # the oldest whose readers know repeated frames
+    version: ClassVar[int] = VERSION
     summary: ClassVar[str] = "multi-chart geometry video: residual images of a blended affine prediction, as H.264 or JPEG"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
 
@@ -120,7 +118,7 @@ class Settings(BaseCodec):
         return "tiles" if n_points <= MAX_TILED else "halves"
 
     def bitstream(
-        self, sequence: MeshSequence, header: Mapping[str, Any], sections: Mapping[str, bytes], video: bytes, version: int
+        self, sequence: MeshSequence, header: Mapping[str, Any], sections: Mapping[str, bytes], video: bytes
     ) -> Bitstream:
-        """The bitstream of a sequence; ``version`` is the oldest that reads it."""
-        return self._bitstream(sequence, header, sections, video, version)
+        """The bitstream of a sequence."""
+        return self._bitstream(sequence, header, sections, video)

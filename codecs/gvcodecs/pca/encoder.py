@@ -18,7 +18,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from gvcodecs.pca.header import MAX_SEGMENTS, VERSION_STILL, Header
+from gvcodecs.pca.header import MAX_SEGMENTS, VERSION, Header
 from gvcodecs.pca.reader import PcaReader, causal_order, coarse_levels
 from gvpipe.coding.codec import BaseCodec, Encoded, FrameReader, Memo
 from gvpipe.container.bitstream import Bitstream
@@ -52,7 +52,7 @@ class Pca(BaseCodec):
     """
 
     id: ClassVar[str] = "pca"
-    version: ClassVar[int] = VERSION_STILL
+    version: ClassVar[int] = VERSION
     summary: ClassVar[str] = "trajectory PCA with geometric predictors: smallest files, levels of detail"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
@@ -90,7 +90,7 @@ class Pca(BaseCodec):
         report("segments", 1)
         steps = tuple(each.step for each in coded)
         header = Header(self.predictor, float(self.beta), n_segments, steps or (1.0,) * n_segments)
-        bitstream = self._bitstream(sequence, header.to_json(), sections, version=None if data else 1, levels=levels)
+        bitstream = self._bitstream(sequence, header.to_json(), sections, levels=levels)
         return Encoded(bitstream, shared.coded.permutation)
 
     @classmethod

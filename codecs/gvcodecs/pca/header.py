@@ -7,8 +7,7 @@
 ``coefficients.N``    feature vectors of segment N, coarse to fine (`coefficient_coding` of `gvpipe.trajectory`)
 ====================  ======================================================================================
 
-Version 1 has no section ``still``; files without one are still written as version 1. Where no point moves, segments have no
-sections.
+Where no point moves, segments have no sections.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from gvpipe.container.segments import read_segments, read_steps
 from gvpipe.trajectory.prediction import PREDICTORS
 
 MAX_SEGMENTS = 2000  # two sections each, of the 4096 that a bitstream may have
-VERSION_STILL = 2  # of files with a section `still` or `holds`
+VERSION = 1  # of this layout
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,12 @@ import numpy as np
 from gvcodecs.pdct.clip import MAX_CLUSTERS, DeltaQuantiser, encode_clip
 from gvcodecs.pdct.clustering import Clusters, find_clusters
 from gvcodecs.pdct.dictionary import BaseFrame
-from gvcodecs.pdct.header import MAX_CLIPS, VERSION_LIVE, VERSION_POINTS, Header, surface_of, surface_of_points
+from gvcodecs.pdct.header import MAX_CLIPS, VERSION, Header, surface_of
 from gvcodecs.pdct.reader import PdctReader
 from gvcodecs.pdct.still_points import SECTION, encode_still
 from gvpipe.coding.codec import BaseCodec, Encoded, FrameReader, Memo
 from gvpipe.coding.quality_scale import error_of
-from gvpipe.connectivity.base_mesh import EncodedMesh, encode_base
+from gvpipe.connectivity.base_mesh import EncodedMesh
 from gvpipe.connectivity.welded_mesh import WeldedMesh, encode_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import MAX_SEGMENT, SegmentParts, cut, numbered_parts
@@ -67,8 +67,7 @@ class Pdct(BaseCodec):
     """
 
     id: ClassVar[str] = "pdct"
-    version: ClassVar[int] = VERSION_LIVE
-    holds_version: ClassVar[int | None] = VERSION_POINTS
+    version: ClassVar[int] = VERSION
     summary: ClassVar[str] = "predictive DCT in local coordinate frames: streams frame by frame, short clips"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
@@ -162,7 +161,7 @@ class Pdct(BaseCodec):
         lattice = Lattice.over(first, self.base_bits)
         at = lattice.quantise(first[members])
         coded, mesh = memo("base", lambda: encode_points(at, sequence.faces, points, self.reorder))
-        sources, surface = coded.permutation[mesh.members], surface_of_points(mesh, lattice)
+        sources, surface = coded.permutation[mesh.members], surface_of(mesh, lattice)
         sections = {"mesh": coded.mesh, "order": coded.order}
         flags = still[sources]  # vertices of one trajectory move, or stand still, together
         if flags.any():
@@ -180,7 +179,7 @@ class Pdct(BaseCodec):
         for c, each in enumerate(map_segments(_code_clip, clips, tasks, lambda done: report("clips", done))):
             sections[f"clip.{c}"], found[c] = each
         report("clips", 1)
-        bitstream = self._bitstream(sequence, Header(n_clips, start.lattice).to_json(), sections, version=VERSION_POINTS)
+        bitstream = self._bitstream(sequence, Header(n_clips, start.lattice).to_json(), sections)
         return Encoded(bitstream, start.coded.permutation)
 
 
@@ -199,11 +198,13 @@ class ClipCoder:
 
     def __init__(self, settings: Pdct, frame: Float32, faces: Int32, fps: float) -> None:
         self.lattice = Lattice.over(frame, settings.base_bits)
-        self.mesh, base = encode_base(self.lattice.quantise(frame), faces, settings.reorder)
-        self._settings, self._surface, self._diagonal = settings, surface_of(base, self.lattice), diagonal_of(frame)
+        vertices = np.arange(len(frame))
+        self.mesh, decoded = encode_points(self.lattice.quantise(frame), faces, vertices, settings.reorder)
+        self._sources = self.mesh.permutation[decoded.members]  # the given vertex of each point
+        self._settings, self._surface, self._diagonal = settings, surface_of(decoded, self.lattice), diagonal_of(frame)
         self.bitstream = Bitstream(
             codec=settings.id,
-            version=VERSION_LIVE,
+            version=VERSION,
             n_frames=1,
             n_vertices=len(frame),
             n_triangles=len(faces),
@@ -219,7 +220,7 @@ class ClipCoder:
 
     def encode(self, frames: Float32) -> bytes:
         """Return the section of a clip, ``frames (n, V, 3)``, model units."""
-        frames = np.ascontiguousarray(frames[:, self.mesh.permutation])
+        frames = np.ascontiguousarray(frames[:, self._sources])
         step = self._settings.open_step(self._diagonal or diagonal_of(frames))
         clusters = self._settings.find_clusters(frames, self._surface)
         return self._settings.encode_clip(frames, self._surface, clusters, step)

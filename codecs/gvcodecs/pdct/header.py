@@ -4,12 +4,11 @@
 ``mesh``      base frame (frame 0) of the points, on its lattice, and connectivity (`gvpipe.connectivity.welded_mesh`)
 ``order``     vertex order, empty if the codec's own (`gvpipe.connectivity.seams`)
 ``still``     points that never move, and their positions (`stillness`); absent if all move
-``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``, of version 3 at frame ``c * clip``
+``clip.N``    frames of clip N (`clip`); clip c starts at frame ``c * F // clips``, or at ``c * clip``
 ============  ===========================================================================
 
-Version 1 has no section ``still``, and every vertex is a point: ``mesh`` and ``order`` are those of
-`gvpipe.connectivity.base_mesh`. If no point moves, there are no clips. Version 3 is that of files that are written as frames
-come: sections are those of version 1, and all clips but the last have the same number of frames, since F is not known.
+If no point moves, there are no clips. Files that are written as frames come do not know F, nor which vertices share a
+trajectory: all clips but the last have ``clip`` frames, every vertex is a point, and there is no section ``still``.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from gvcodecs.pdct.dictionary import BaseFrame
-from gvpipe.connectivity.base_mesh import BaseMesh
 from gvpipe.connectivity.lattice_field import read_lattice
 from gvpipe.connectivity.welded_mesh import WeldedMesh
 from gvpipe.container.bitstream import Bitstream
@@ -28,8 +26,7 @@ from gvpipe.container.segments import MAX_SEGMENT, count_segments, read_segments
 from gvpipe.foundation.errors import CorruptFile
 from gvpipe.mesh.lattice import Lattice
 
-VERSION_POINTS = 2  # vertices that share a trajectory are one point; sections `still` and `holds`
-VERSION_LIVE = 3  # written as frames come
+VERSION = 1  # of this layout
 MAX_CLIPS = 4000
 
 
@@ -62,7 +59,7 @@ class Header:
     def of(cls, bitstream: Bitstream) -> Header:
         """Mirror of `to_json`; raises `CorruptFile` for values out of range."""
         base = read_lattice(bitstream.fields)
-        if bitstream.version < VERSION_LIVE:
+        if "clip" not in bitstream.header:
             return cls(read_segments(bitstream, MAX_CLIPS, "clips"), base)
         clip = bitstream.fields.integer("clip", 1, MAX_SEGMENT)
         clips = count_segments(bitstream.n_frames, clip)
@@ -71,11 +68,6 @@ class Header:
         return cls(clips, base, clip)
 
 
-def surface_of(mesh: BaseMesh, lattice: Lattice) -> BaseFrame:
-    """What all clips share where every vertex is a point; signals follow the codec's order, a traversal of the surface."""
-    return BaseFrame(lattice.points_at(mesh.points), mesh.faces, np.argsort(mesh.visits))
-
-
-def surface_of_points(mesh: WeldedMesh, lattice: Lattice) -> BaseFrame:
+def surface_of(mesh: WeldedMesh, lattice: Lattice) -> BaseFrame:
     """What all clips share, from the decoded base frame; points are numbered along the traversal."""
     return BaseFrame(lattice.points_at(mesh.lattice), mesh.point_faces, np.arange(len(mesh.lattice)))

@@ -7,13 +7,12 @@ from bisect import bisect_right
 import numpy as np
 
 from gvcodecs.pdct.clip import count_bytes, decode_clip
-from gvcodecs.pdct.header import VERSION_POINTS, Header, surface_of, surface_of_points
+from gvcodecs.pdct.header import Header, surface_of
 from gvcodecs.pdct.still_points import SECTION, decode_still
-from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import read_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segments_between
-from gvpipe.foundation.arrays import Float32, Int32, Int64
+from gvpipe.foundation.arrays import Float32, Int32
 from gvpipe.runtime.ahead import AHEAD, run_ahead
 
 BYTES_PER_POINT, SECONDS_PER_POINT = 200, 1e-6  # of the base frame, its traversal, still points
@@ -29,13 +28,8 @@ class PdctReader:
     def __init__(self, bitstream: Bitstream) -> None:
         header = Header.of(bitstream)
         self._bitstream = bitstream
-        self._point: Int64 | None = None  # (V,) of each vertex; None: every vertex is one
-        if bitstream.version != VERSION_POINTS:
-            base = read_base(bitstream)
-            self._faces, surface = base.faces, surface_of(base, header.base)
-        else:
-            mesh = read_points(bitstream)
-            self._faces, self._point, surface = mesh.faces, mesh.point, surface_of_points(mesh, header.base)
+        mesh = read_points(bitstream)
+        self._faces, self._point, surface = mesh.faces, mesh.point, surface_of(mesh, header.base)
         self._still = decode_still(bitstream.section(SECTION), surface) if SECTION in bitstream.sections else None
         self._surface = surface if self._still is None else surface.without(self._still.points)
         n_points = len(surface.base)
@@ -73,7 +67,7 @@ class PdctReader:
             result[first - start : last - start] = clip[first - begin : last - begin]
         if self._still is not None:
             result[:, self._still.points] = self._still.positions
-        return result if self._point is None else np.ascontiguousarray(result[:, self._point])
+        return np.ascontiguousarray(result[:, self._point])
 
     def _has_room(self, clips: list[int]) -> bool:
         """Whether the file may take the memory of several of these clips at a time."""

@@ -22,8 +22,9 @@ from gvcodecs.pdct.dictionary import BaseFrame
 from gvcodecs.pdct.encoder import ClipCoder, Pdct
 from gvcodecs.pdct.header import surface_of
 from gvcodecs.pdct.reader import BYTES_PER_POINT, SECONDS_PER_POINT
-from gvpipe.connectivity.base_mesh import BaseMesh, decode_base, keep_mesh
+from gvpipe.connectivity.base_mesh import keep_mesh
 from gvpipe.connectivity.lattice_field import read_lattice
+from gvpipe.connectivity.welded_mesh import WeldedMesh, decode_points
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.segments import MAX_SEGMENT
 from gvpipe.foundation.arrays import Float32, Floats, Int32, Integers
@@ -119,7 +120,7 @@ class StreamReader:
     def __init__(self, *, unlimited: bool = False) -> None:
         self._is_unlimited, self._n_bytes = unlimited, 0
         self._buffer = bytearray()
-        self._mesh: BaseMesh | None = None
+        self._mesh: WeldedMesh | None = None
         self._surface: BaseFrame | None = None
         self._clips = 0
         self.fps = 0.0  # frames per second, once the head is there
@@ -180,8 +181,8 @@ class StreamReader:
         self._budget(n_vertices, n_triangles)
         mesh = bytes(self._buffer[start : start + bytes_mesh])
         order = bytes(self._buffer[start + bytes_mesh : start + bytes_mesh + bytes_order])
-        decoded = decode_base(mesh, order, n_vertices, n_triangles)
-        if (len(decoded.points), len(decoded.faces)) != (n_vertices, n_triangles):
+        decoded = decode_points(mesh, order, n_vertices, n_triangles)
+        if (len(decoded.point), len(decoded.faces)) != (n_vertices, n_triangles):
             raise CorruptFile("the mesh has other vertices and triangles than the head says; get the stream again")
         del self._buffer[: start + bytes_mesh + bytes_order]
         self._mesh, self._surface, self.fps = decoded, surface_of(decoded, lattice), fps
@@ -207,4 +208,5 @@ class StreamReader:
         del self._buffer[: CLIP.size + size]
         self._clips += 1
         budget = self._budget(len(self._surface.base), len(self._mesh.faces))
-        return decode_clip(data, n_frames, self._surface, f"clip.{self._clips - 1}", budget)
+        frames = decode_clip(data, n_frames, self._surface, f"clip.{self._clips - 1}", budget)
+        return np.ascontiguousarray(frames[:, self._mesh.point])

@@ -60,9 +60,6 @@ export const ORDER_KERNELS_N_GROUPS = 3;
 export const POSITION_KERNELS_N_CONTEXTS = 8;
 export const POSITION_KERNELS_N_GROUPS = 9;
 
-// gvpipe.connectivity.seams
-export const SEAMS_MAX_SEAM_VERTICES = 7;
-
 // gvpipe.connectivity.vertex_order
 export const VERTEX_ORDER_REACH = 256;
 export const VERTEX_ORDER_MAX_VERTICES = 16777215;
@@ -75,7 +72,7 @@ export const WELDED_MESH_ADAPTIVE_MESH = 1;
 export const WELDED_MESH_ADAPTIVE_ORDER = 2;
 
 // gvpipe.container.bare
-export const BARE_VERSION = 3;
+export const BARE_MAGIC = [103, 118, 98, 97, 114, 101, 13, 10];
 
 // gvpipe.container.bitstream
 export const BITSTREAM_MAGIC = [103, 118, 112, 105, 112, 101, 13, 10];
@@ -102,7 +99,6 @@ export const LIVE_LAYOUT_HEAD_BYTES = 24;
 export const LIVE_LAYOUT_LIVE_UUID = [213, 240, 177, 200, 106, 30, 76, 87, 159, 67, 43, 122, 144, 196, 232, 97];
 
 // gvpipe.container.stream_layout
-export const STREAM_LAYOUT_VERSION = 2;
 export const STREAM_LAYOUT_INDEX_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 82];
 export const STREAM_LAYOUT_ROOM_UUID = [60, 10, 126, 53, 143, 13, 74, 134, 155, 14, 31, 91, 143, 31, 111, 83];
 export const STREAM_LAYOUT_MAX_INDEX = 33554432;
@@ -253,7 +249,7 @@ export const LAPLACIAN_DELTA_ROWS_N_RING = new Map([["kalman", 6], ["rigid", 15]
 
 // gvcodecs.laplacian.header
 export const LAPLACIAN_HEADER_MAX_SEGMENTS = 1300;
-export const LAPLACIAN_HEADER_VERSION_STILL = 2;
+export const LAPLACIAN_HEADER_VERSION = 1;
 export const LAPLACIAN_HEADER_MAX_SPACING = 1048576;
 export const LAPLACIAN_HEADER_LEAST_RATIO = 0.0009765625;
 export const LAPLACIAN_HEADER_MOST_RATIO = 1024.0;
@@ -279,11 +275,10 @@ export const LAPLACIAN_NORMAL_EQUATIONS_SECONDS_PER_SOLVED = 5e-10;
 // gvcodecs.mcgv.base.surface
 export const SURFACE_STILL = "still";
 
-// gvcodecs.mcgv.reader
-export const READER_BROWSER_VERSION = 5;
-
 // gvcodecs.mcgv.header
+export const HEADER_VERSION = 1;
 export const HEADER_OF_PICTURES = ["placement", "profile", "block", "width", "height", "residual_step"];
+export const HEADER_MAX_FINENESS = 256;
 export const HEADER_PREDICTIONS = ["blended", "affine"];
 export const HEADER_PLACEMENTS = ["halves", "charts", "tiles"];
 export const HEADER_MAX_CLUSTERS = 1024;
@@ -324,16 +319,13 @@ export const WEIGHT_KERNELS_MAX_LISTED = 32;
 // gvcodecs.mcgv.pictures.trajectories
 export const TRAJECTORIES_PLANES = 3;
 
-// gvcodecs.mcgv.trajectory_header
-export const TRAJECTORY_HEADER_MAX_FINENESS = 256;
-
 // gvcodecs.mcgv.decoding.trajectory_reader
 export const TRAJECTORY_READER_BYTES_PER_SAMPLE = 48;
 export const TRAJECTORY_READER_SECONDS_PER_SAMPLE = 1e-07;
 
 // gvcodecs.pca.header
 export const PCA_HEADER_MAX_SEGMENTS = 2000;
-export const PCA_HEADER_VERSION_STILL = 2;
+export const PCA_HEADER_VERSION = 1;
 
 // gvcodecs.pdct.clip
 export const PDCT_CLIP_MAX_CLUSTERS = 1024;
@@ -347,8 +339,7 @@ export const PDCT_DELTA_CODING_PROBLEMS = ["", "its range-coded data do not deco
 
 // gvcodecs.pdct.header
 export const PDCT_HEADER_MAX_CLIPS = 4000;
-export const PDCT_HEADER_VERSION_POINTS = 2;
-export const PDCT_HEADER_VERSION_LIVE = 3;
+export const PDCT_HEADER_VERSION = 1;
 
 // gvcodecs.pdct.reader
 export const PDCT_READER_BYTES_PER_POINT = 200;

@@ -91,7 +91,7 @@ def begin(job: Job, step: float, target_error: float, before: Start | None = Non
     if key not in bases:
         if job.is_large:  # those before would take more memory than coding one of them again takes time
             bases.clear()
-        bases[key] = encode_points(positions, given.faces, point, settings.reorder, True, adaptive)
+        bases[key] = encode_points(positions, given.faces, point, settings.reorder, adaptive)
     coded, mesh = bases[key]
     sources = coded.permutation[mesh.members]  # the given vertex of each point
     is_still = still[sources].copy()

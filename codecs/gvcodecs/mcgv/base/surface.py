@@ -1,8 +1,7 @@
 """What a reader knows of the base frame: which vertices move, what shares a sample, and what shares a blend.
 
-A *slot* is what a picture has a pixel for. In files of version 3 slots are the points that move: vertices that coincide in
-every frame coincide when decoded, and vertices that stand still have neither sample nor motion. Before, every vertex was a
-slot, and a blend moved vertices at one base position together.
+A *slot* is what a picture has a pixel for: a point that moves. Vertices that coincide in every frame coincide when decoded, and
+vertices that stand still have neither sample nor motion.
 """
 
 from __future__ import annotations
@@ -13,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
+from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.header import Header
-from gvpipe.connectivity.base_mesh import read_base
 from gvpipe.connectivity.welded_mesh import open_points
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
@@ -31,17 +29,12 @@ class Slots:
 
     Args:
         lattice: ``(S, 3)`` their base positions, lattice units; base: the same in model units.
-        point: ``(S,)`` the point of each slot; members: ``(P,)`` a slot of each point.
-        points: that a blend moves.
-        order: ``(S,)`` slots in the codec's order.
+        points: what joins them.
     """
 
     lattice: Int32
     base: Float64
-    point: Int64
-    members: Int64
     points: Points
-    order: Int64
 
     @property
     def n_slots(self) -> int:
@@ -93,25 +86,17 @@ def open_surface(bitstream: Bitstream, header: Header) -> Iterator[tuple[Slots, 
 
     What needs slots alone can be done meanwhile.
     """
-    if bitstream.version < 3:
-        base = read_base(bitstream)
-        points, point, members = weld_vertices(base.points, base.faces, base.visits)
-        own, placed = np.arange(len(base.points)), _place(base.points, header)
-        order, rest = np.argsort(base.visits), np.zeros((0, 3), np.float32)
-        surface = DecodedBase(base.points, placed, point, members, points, order, base.faces, rest, own, own)
-        yield surface, lambda: surface
-        return
-    with open_points(bitstream, bitstream.version > 3, bitstream.version > 4) as (opened, finished):
+    with open_points(bitstream) as (opened, finished):
         n_points = len(opened.lattice)
         has_still = STILL in bitstream.sections
         still = decode_flags(bitstream.section(STILL), n_points, STILL) if has_still else np.zeros(n_points, bool)
         moves = np.flatnonzero(~still)
         if not len(moves):
             raise CorruptFile("section 'still' is corrupt: one point at least has samples; get the file again from its source")
-        placed, own, all_move = _place(opened.lattice, header), np.arange(len(moves)), len(moves) == n_points
+        placed, all_move = _place(opened.lattice, header), len(moves) == n_points
         lattice = opened.lattice if all_move else opened.lattice.take(moves, axis=0)
         slot_base = placed if all_move else placed.take(moves, axis=0)
-        slots = Slots(lattice, slot_base, own, own, Points.moving(opened, moves), own)
+        slots = Slots(lattice, slot_base, Points.moving(opened, moves))
 
         def finish() -> DecodedBase:
             mesh = finished()

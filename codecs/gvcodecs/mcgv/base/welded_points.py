@@ -1,4 +1,4 @@
-"""Points: what a blend moves. In files of version 3, the mesh's points that move; before, vertices at one base position.
+"""Points: what a blend moves, the mesh's points that move.
 
 Points are numbered in the codec's order, which is a walk over the surface (Draco's).
 """
@@ -13,8 +13,8 @@ from scipy import sparse
 
 from gvcodecs.mcgv.base.causal_neighbours import CausalNeighbours, causal_neighbours_in
 from gvpipe.connectivity.welded_mesh import PointMesh
-from gvpipe.foundation.arrays import Int32, Int64, Integers
-from gvpipe.mesh.topology import adjacency_of, graph_of, weld
+from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.mesh.topology import adjacency_of, graph_of
 from gvpipe.runtime.forks import kept
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
@@ -63,21 +63,3 @@ class Points:
         from gvpipe.mesh.graph_kernels import label_components
 
         return label_components(self.graph)
-
-
-def weld_vertices(lattice: Integers, faces: Int32, visits: Int64) -> tuple[Points, Int64, Int64]:
-    """Weld vertices at ``lattice (V, 3)``, as files before version 3 do; ``visits (V,)`` are their places in the codec's order.
-
-    Returns:
-        The points, the point of each vertex ``(V,)``, and the first vertex of each point ``(P,)``.
-    """
-    from gvpipe.mesh.graph_kernels import link_vertices
-
-    order = np.argsort(visits)
-    first, found = weld(lattice[order])  # first: places in the codec's order
-    members = np.sort(first)
-    number = np.searchsorted(members, first)
-    point = np.empty(len(lattice), np.int64)
-    point[order] = number[found]
-    own = point[faces].astype(np.int32)
-    return Points(own, link_vertices(own, len(members))), point, order[members]

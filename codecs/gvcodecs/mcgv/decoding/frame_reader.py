@@ -119,7 +119,7 @@ class McgvReader:
         bitstream, header = self._bitstream, self._header
         surface = self._surface
         if header.placement == "halves":
-            clusters = decode_slot_clusters(bitstream.section("clusters"), surface.order, header.clusters)
+            clusters = decode_slot_clusters(bitstream.section("clusters"), surface.n_slots, header.clusters)
             layout = read_layout(bitstream, header, surface, clusters)
         else:
             layout = read_layout(bitstream, header, surface)
@@ -213,9 +213,9 @@ def read_layout(bitstream: Bitstream, header: Header, slots: Slots, groups: Inte
     if n_pixels < slots.n_slots:
         raise CorruptFile(f"header: planes of {header.width}x{header.height} do not hold {slots.n_slots} samples")
     if header.placement == "halves":
-        groups = slots.points.pieces()[slots.point] if groups is None else groups
+        groups = slots.points.pieces() if groups is None else groups
         return place_points(slots.lattice, groups, header.width, header.height, header.block)
     if header.placement == "tiles":
         charts = decode_charts(bitstream.section(CHARTS), slots.points.causal_neighbours())
-        return place_charts(slots.lattice, charts[slots.point], header.width, header.height, header.block)
-    return decode_pixels(bitstream.section("pixels"), slots.order, header.width, header.height)
+        return place_charts(slots.lattice, charts, header.width, header.height, header.block)
+    return decode_pixels(bitstream.section("pixels"), slots.n_slots, header.width, header.height)

@@ -12,14 +12,13 @@ from scipy import sparse
 
 from gvcodecs.mcgv.base.surface import DecodedBase, read_surface
 from gvcodecs.mcgv.decoding.frame_reader import read_layout
-from gvcodecs.mcgv.header import Header
+from gvcodecs.mcgv.header import Header, TrajectoryHeader
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.motion.blended import keep_blend
 from gvcodecs.mcgv.motion.contract import locate
 from gvcodecs.mcgv.motion.skinning import Blend
 from gvcodecs.mcgv.motion.weight_coding import decode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, decode_segment
-from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.segments import segment_starts
@@ -107,7 +106,7 @@ class TrajectoryReader:
         layout = read_layout(self._bitstream, header, surface)
         keep_blend(self._bitstream, surface, header)
         weights = decode_weights(self._bitstream.section("weights"), surface.points.causal_neighbours(), header.clusters)
-        matrix = Blend(surface.base[surface.members], weights, header.clusters).matrix()
+        matrix = Blend(surface.base, weights, header.clusters).matrix()
         return _Shared(np.ascontiguousarray(surface.base.T), layout, matrix)
 
     def close(self) -> None:
@@ -135,14 +134,14 @@ class TrajectoryReader:
 
     def _decode(self, s: int) -> _Segment:
         if self._segment is None or self._segment.number != s:
-            name, point = f"trajectories.{s}", self._surface.point
+            name = f"trajectories.{s}"
             n_frames = self._bounds[s + 1] - self._bounds[s]
             data, budget = self._bitstream.section(name), self._bitstream.budget
-            n_values = self._images.components[s] * len(point)
+            n_values = self._images.components[s] * self._surface.n_slots
             budget.ask(f"section {name!r}", BYTES_PER_SAMPLE * n_values, SECONDS_PER_SAMPLE * n_values)
             samples, step = self._samples(s), self._images.steps[s]
             matrix = self._shared.matrix
-            basis, coefficients = decode_segment(Cursor(data, name), samples, step, matrix, point, n_frames, budget)
+            basis, coefficients = decode_segment(Cursor(data, name), samples, step, matrix, n_frames, budget)
             self._segment = _Segment(s, basis, coefficients)
         return self._segment
 

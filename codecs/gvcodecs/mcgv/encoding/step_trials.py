@@ -62,6 +62,5 @@ def _code(job: Job, candidate: Candidate, step: float) -> tuple[Start, Coded]:
 
 def _assemble(job: Job, start: Start, coded: Coded) -> Encoded:
     header = coded.header(job.settings, start).to_json()
-    version = 5 if start.coded.is_adaptive else 4
-    bitstream = job.settings.bitstream(job.sequence, header, coded.all_sections(start), coded.video, version)
+    bitstream = job.settings.bitstream(job.sequence, header, coded.all_sections(start), coded.video)
     return Encoded(bitstream, start.coded.permutation)

@@ -21,21 +21,20 @@ def encode_pixels(layout: Layout) -> bytes:
     return pack_block(columns) + encode_integers(dy, _context(dx))
 
 
-def decode_pixels(data: bytes, order: Int64, width: int, height: int) -> Layout:
-    """Mirror of `encode_pixels`, for slots in the codec's ``order (S,)``.
+def decode_pixels(data: bytes, n_slots: int, width: int, height: int) -> Layout:
+    """Mirror of `encode_pixels`.
 
     Raises:
         CorruptFile: a slot has no pixel of its own inside the plane.
     """
     cursor = Cursor(data, "pixels")
     columns = cursor.block()
-    dx = decode_integers(columns, len(order), name="pixels")
-    dy = decode_integers(cursor.rest(), len(order), _context(dx), "pixels")
+    dx = decode_integers(columns, n_slots, name="pixels")
+    dy = decode_integers(cursor.rest(), n_slots, _context(dx), "pixels")
     x, y = np.cumsum(dx), np.cumsum(dy)
     if ((x < 0) | (x >= width) | (y < 0) | (y >= height)).any():
         raise cursor.corrupt("a pixel lies outside the plane")
-    pixel = np.empty(len(order), np.int64)
-    pixel[order] = y * width + x
+    pixel = np.asarray(y * width + x, np.int64)
     if np.bincount(pixel).max(initial=0) > 1:
         raise cursor.corrupt("two slots share a pixel")
     return Layout(width, height, pixel)
@@ -61,14 +60,12 @@ def encode_slot_clusters(clusters: Int32) -> bytes:
     return encode_integers(np.diff(clusters, prepend=np.int32(0)))
 
 
-def decode_slot_clusters(data: bytes, order: Int64, n_clusters: int) -> Int32:
-    """Mirror of `encode_slot_clusters`, slots in the codec's ``order (S,)``; raises `CorruptFile` if one is out of range."""
-    ordered = np.cumsum(decode_integers(data, len(order), name="clusters"))
-    if ((ordered < 0) | (ordered >= n_clusters)).any():
+def decode_slot_clusters(data: bytes, n_slots: int, n_clusters: int) -> Int32:
+    """Mirror of `encode_slot_clusters`; raises `CorruptFile` if a cluster is out of range."""
+    clusters = np.cumsum(decode_integers(data, n_slots, name="clusters"))
+    if ((clusters < 0) | (clusters >= n_clusters)).any():
         raise CorruptFile(f"section 'clusters' is corrupt: a cluster is not in 0..{n_clusters - 1}")
-    clusters = np.empty(len(order), np.int32)
-    clusters[order] = ordered
-    return clusters
+    return clusters.astype(np.int32)
 
 
 def _context(dx: Int64) -> Int64:

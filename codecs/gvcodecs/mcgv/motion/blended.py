@@ -39,7 +39,7 @@ LARGE = 1 << 14  # vertices that move; fewer do not pay for other threads
 
 def keep_blend(bitstream: Bitstream, slots: Slots, header: Header) -> None:
     """Check that a file may take the memory and work of its skinning weights; raises `OverBudget`."""
-    n_points, n_transforms = len(slots.members), CHUNK * 12 * header.clusters
+    n_points, n_transforms = slots.n_slots, CHUNK * 12 * header.clusters
     what = f"a blend of {header.clusters} clusters for {n_points} points"
     bitstream.budget.keep(what, BYTES_PER_POINT * n_points + 24 * n_transforms, SECONDS_PER_POINT * n_points)
 
@@ -120,7 +120,7 @@ def read_blend(bitstream: Bitstream, header: Header, slots: Slots) -> Blend:
     """The blend of a file's points; raises `CorruptFile`, `OverBudget`."""
     keep_blend(bitstream, slots, header)
     weights = decode_weights(bitstream.section("weights"), slots.points.causal_neighbours(), header.clusters)
-    return Blend(slots.base.take(slots.members, axis=0), weights, header.clusters)
+    return Blend(slots.base, weights, header.clusters)
 
 
 class BlendedMotion:
@@ -178,7 +178,7 @@ class BlendedMotion:
         from gvcodecs.mcgv.motion.reconstruction_kernels import rebuild_without_pictures
 
         samples, blend = self._samples, self._blend
-        places = samples.vertices[span], samples.slots[span], samples.surface.base, samples.surface.point
+        places = samples.vertices[span], samples.slots[span], samples.surface.base
         rebuild_without_pictures(*places, blend.homogeneous, blend.weights, transforms, positions)
 
     @kept
@@ -189,7 +189,7 @@ class BlendedMotion:
         slots, surface, blend = self._samples.slots, self._samples.surface, self._blend
         return [
             *run_ahead(
-                lambda span: skinned_points(slots[span], surface.base, surface.point, blend.homogeneous, blend.weights),
+                lambda span: skinned_points(slots[span], surface.base, blend.homogeneous, blend.weights),
                 self._spans,
             )
         ]

@@ -61,16 +61,16 @@ class SkinnedPoints(NamedTuple):
 
 
 @compiled
-def skinned_points(slots: Int64, base: Float64, points: Int64, homogeneous: Float64, weights: Weights) -> SkinnedPoints:
+def skinned_points(slots: Int64, base: Float64, homogeneous: Float64, weights: Weights) -> SkinnedPoints:
     """What skinning needs of vertices at ``slots (M,)``.
 
     Args:
-        base: ``(S, 3)`` the slots' base positions; points: ``(S,)`` their points.
-        homogeneous: ``(P, 4)`` the points' coordinates.
+        base: ``(S, 3)`` the slots' base positions.
+        homogeneous: ``(S, 4)`` their coordinates.
         weights: theirs.
     """
     result = _new_points(len(slots))
-    _fill_points(slots, 0, base, points, homogeneous, weights, result)
+    _fill_points(slots, 0, base, homogeneous, weights, result)
     return result
 
 
@@ -83,23 +83,22 @@ def _new_points(n: int) -> SkinnedPoints:
 
 @compiled
 def _fill_points(
-    slots: Int64, first: int, base: Float64, points: Int64, homogeneous: Float64, weights: Weights, result: SkinnedPoints
+    slots: Int64, first: int, base: Float64, homogeneous: Float64, weights: Weights, result: SkinnedPoints
 ) -> None:
     """As `skinned_points`, from a first vertex on, as many as there is memory for, or vertices left."""
     bases, coordinates, clusters, parts = result
     for i in range(min(len(bases) // COORDINATES, len(slots) - first)):
         later = slots[min(first + i + SOON, len(slots) - 1)]
         prefetch(base, later, 0)
-        prefetch(homogeneous, points[later], 0)
-        prefetch(weights.clusters, points[later], 0)
-        prefetch(weights.weights, points[later], 0)
-        slot = slots[first + i]
-        at, point = COORDINATES * i, points[slot]
+        prefetch(homogeneous, later, 0)
+        prefetch(weights.clusters, later, 0)
+        prefetch(weights.weights, later, 0)
+        slot, at = slots[first + i], COORDINATES * i
         for k in range(3):
             bases[at + k] = base[slot, k]
         for k in range(COORDINATES):
-            coordinates[at + k], clusters[at + k] = homogeneous[point, k], weights.clusters[point, k]
-            parts[at + k] = weights.weights[point, k] / TOTAL
+            coordinates[at + k], clusters[at + k] = homogeneous[slot, k], weights.clusters[slot, k]
+            parts[at + k] = weights.weights[slot, k] / TOTAL
 
 
 def in_rows(vectors: Float64) -> Float64:
@@ -134,7 +133,6 @@ def rebuild_without_pictures(
     vertices: Int64,
     slots: Int64,
     base: Float64,
-    points: Int64,
     homogeneous: Float64,
     weights: Weights,
     transforms: Float64,
@@ -147,7 +145,7 @@ def rebuild_without_pictures(
     """
     fetched = _new_points(AT_ONCE)
     for first in range(0, len(vertices), AT_ONCE):
-        _fill_points(slots, first, base, points, homogeneous, weights, fetched)
+        _fill_points(slots, first, base, homogeneous, weights, fetched)
         _rebuild_some(vertices, first, fetched, transforms, positions)
 
 

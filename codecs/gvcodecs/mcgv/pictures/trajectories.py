@@ -32,7 +32,7 @@ from gvcodecs.mcgv.motion.skinning import BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import decode_coefficients, encode_coefficients
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import InputError
 from gvpipe.trajectory.basis import Basis, decode_basis, reduce_trajectories
@@ -84,7 +84,6 @@ def decode_segment(
     samples: Float64,
     step: float,
     matrix: sparse.csr_array,
-    point: Int64,
     n_frames: int,
     budget: Budget = UNLIMITED,
 ) -> tuple[Basis, Float64]:
@@ -94,7 +93,7 @@ def decode_segment(
         cursor: over the section.
         samples: ``(R, V)`` what the planes hold, steps; changed where vertices are outliers.
         step: D, model units.
-        matrix: ``(P, 4K)`` of the blend; point: ``(V,)`` the point of each vertex.
+        matrix: ``(P, 4K)`` of the blend.
         n_frames: of the segment.
         budget: of the file.
 
@@ -110,7 +109,7 @@ def decode_segment(
     transforms = decode_coefficients(rows, matrix.shape[1] // 4, n_components, step, cursor.name)
     _decode_outliers(cursor, samples)
     samples *= step
-    samples += np.ascontiguousarray(multiply(matrix, transforms).T)[:, point]
+    samples += np.ascontiguousarray(multiply(matrix, transforms).T)
     return basis, samples
 
 

@@ -15,13 +15,13 @@ import numpy as np
 
 from gvcodecs.mcgv.base.base_frame import Start
 from gvcodecs.mcgv.encode_job import Job
+from gvcodecs.mcgv.header import TrajectoryHeader
 from gvcodecs.mcgv.layout.layout import Layout
 from gvcodecs.mcgv.layout.padding import Padding
 from gvcodecs.mcgv.motion.blend_problem import Fitted
 from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.weight_coding import encode_weights
 from gvcodecs.mcgv.pictures.trajectories import PLANES, count_pictures, encode_segment
-from gvcodecs.mcgv.trajectory_header import TrajectoryHeader
 from gvpipe.foundation.arrays import Float64
 from gvpipe.media.video import Plane, Profile, VideoWriter
 

@@ -1,6 +1,6 @@
 /**
  * Triangles and base-frame lattice points. Mirrors `gvpipe.connectivity.base_mesh.decode_base`; `docs/format.md`, section 4: what Draco
- * carries, then the loose vertices and triangles beside it, all in the user's vertex order in the end.
+ * carries, then the loose vertices and triangles beside it.
  */
 
 import { VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
@@ -9,35 +9,17 @@ import { decodeDraco } from "./draco.js";
 import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
 import { inflate } from "./inflate.js";
 import { previousEqual } from "./points.js";
-import { decodeOrder } from "./vertex_order.js";
 
 /**
  * @typedef {object} BaseMesh
- * @property {Int32Array} points (V, 3) lattice units, flat
+ * @property {Int32Array} points (P, 3) lattice units, flat, in the codec's order
  * @property {Uint32Array} faces (T, 3) flat
- * @property {Int32Array} visits (V) vertex v is the codec's vertex visits[v]
  *
- * @param {import("../wasm/kernels.js").Kernels} kernels
- * @param {Uint8Array} mesh @param {Uint8Array} order sections
+ * @param {Uint8Array} mesh stream
  * @param {{vertices: number, triangles: number}} most of the header
  * @returns {Promise<BaseMesh>}
  */
-export async function decodeBase(kernels, mesh, order, most) {
-  const { points, faces } = await decodeMesh(mesh, most);
-  const n = points.length / 3;
-  const visits = Int32Array.from({ length: n }, (_, v) => v);
-  if (order.length === 0) return { points, faces, visits };
-  decodeOrder(kernels, order, points, faces, visits);
-  const moved = new Int32Array(3 * n);
-  const rank = new Int32Array(n); // the user's vertex of each of the codec's
-  for (let v = 0; v < n; v++) {
-    rank[visits[v]] = v;
-    for (let axis = 0; axis < 3; axis++) moved[3 * v + axis] = points[3 * visits[v] + axis];
-  }
-  return { points: moved, faces: faces.map((vertex) => rank[vertex]), visits };
-}
-
-async function decodeMesh(mesh, most) {
+export async function decodeBase(mesh, most) {
   const cursor = new Cursor(mesh, "mesh");
   const [bytesDraco, looseVertices, looseFaces, bytesVertices] = [cursor.u32(), cursor.u32(), cursor.u32(), cursor.u32()];
   if (looseVertices > most.vertices || looseFaces > most.triangles) {

@@ -4,14 +4,12 @@
  */
 
 import {
-  BARE_VERSION,
   BITSTREAM_VERSION as CONTAINER_VERSION,
   MP4_BOX_UUID as UUID,
   MP4_MAX_BOXES as MAX_BOXES,
   STREAM_LAYOUT_INDEX_UUID as INDEX_UUID,
   STREAM_LAYOUT_MAX_INDEX as MAX_INDEX,
   STREAM_LAYOUT_ROOM_UUID as ROOM_UUID,
-  STREAM_LAYOUT_VERSION as STREAM_VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, GeometryVideoError } from "./errors.js";
@@ -47,7 +45,7 @@ export function readContainer(file) {
   }
   const moov = boxes.find((box) => box.kind === "moov");
   const tag = readTag(file.subarray(moov.start, moov.end));
-  if (tag && Number(tag[1]) > STREAM_VERSION) throw newerContainer(tag[1]);
+  if (tag && Number(tag[1]) > CONTAINER_VERSION) throw newerContainer(tag[1]);
   if (indices.length === 1 && boxes[2] === indices[0]) {
     const box = { start: indices[0].start + INDEX_UUID.length, end: indices[0].end };
     return { ...readStream(file, box), bytes: file.length, id: tag ? tag[2] : "" };
@@ -95,12 +93,9 @@ export function findIndex(start) {
 
 /** The error for a container that is not read here. */
 export function newerContainer(version) {
-  if (Number(version) === BARE_VERSION) {
-    return new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
-  }
   return new GeometryVideoError(
     "newer",
-    `container version ${version}, this player reads up to ${STREAM_VERSION}; a newer player is needed`,
+    `container version ${version}, this player reads up to ${CONTAINER_VERSION}; a newer player is needed`,
   );
 }
 

@@ -1,6 +1,7 @@
 /** The payload: named sections with checksums, and a JSON header. Mirrors `gvpipe.container.bitstream`; `docs/format.md`, section 2. */
 
 import {
+  BARE_MAGIC,
   BITSTREAM_MAGIC as MAGIC,
   BITSTREAM_MAX_FRAMES as MAX_FRAMES,
   BITSTREAM_MAX_HEADER as MAX_HEADER,
@@ -63,6 +64,9 @@ function readPayloadSections(payload) {
 
 function readTable(cursor) {
   const start = cursor.take(Math.min(cursor.left, MAGIC.length));
+  if (BARE_MAGIC.every((byte, i) => start[i] === byte)) {
+    throw new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
+  }
   if (!MAGIC.every((byte, i) => start[i] === byte)) {
     throw new GeometryVideoError("corrupt", `the payload does not start with gvpipe's magic; ${AGAIN}`);
   }

@@ -3,7 +3,7 @@
  * 6.1.
  */
 
-import { SEAMS_MAX_SEAM_VERTICES as MAX_SEAM_VERTICES, VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
+import { VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
 import { decodeAdaptiveOrder } from "./adaptive_order.js";
 import { corrupt } from "./errors.js";
 import { decodeIntegers } from "./integers.js";
@@ -15,12 +15,12 @@ import { decodeOrder } from "./vertex_order.js";
  * @param {Uint8Array} counts @param {Uint8Array} copies parts of section `mesh`
  * @param {Uint8Array} order section
  * @param {Uint32Array} pointFaces (T, 3) triangles over points, smallest point first, flat
- * @param {number} nPoints P @param {boolean} across whether seams are coded across edges (`edge_seams.js`)
+ * @param {number} nPoints P
  * @param {boolean} adaptive whether the order is that of `adaptive_order.js`
  * @returns {{faces: Uint32Array, point: Int32Array}} triangles (T, 3) over vertices, flat, and the point of each vertex (V)
  */
-export function decodeCopies(kernels, counts, copies, order, pointFaces, nPoints, across, adaptive) {
-  const { faces, point } = decodeCorners(kernels, counts, copies, pointFaces, nPoints, across);
+export function decodeCopies(kernels, counts, copies, order, pointFaces, nPoints, adaptive) {
+  const { faces, point } = decodeCorners(kernels, counts, copies, pointFaces, nPoints);
   if (order.length === 0) return { faces, point };
   const n = point.length;
   const lattice = new Int32Array(3 * n); // for the walk: equal where points are
@@ -33,7 +33,7 @@ export function decodeCopies(kernels, counts, copies, order, pointFaces, nPoints
 }
 
 /** The same in the codec's order: the vertices of point 0, then those of point 1, and so on. */
-function decodeCorners(kernels, countsData, data, pointFaces, nPoints, across) {
+function decodeCorners(kernels, countsData, data, pointFaces, nPoints) {
   const counts = decodeIntegers(countsData, nPoints, null, "mesh").map((others) => others + 1);
   const starts = new Float64Array(nPoints + 1); // first vertex of each point, and V
   for (let p = 0; p < nPoints; p++) {
@@ -41,25 +41,11 @@ function decodeCorners(kernels, countsData, data, pointFaces, nPoints, across) {
     if (counts[p] < 1 || starts[p + 1] > MAX_VERTICES) throw corrupt("mesh", "a number of copies is out of range");
   }
   const where = sharedCorners(pointFaces, counts);
-  const copies = across ? decodeSeams(kernels, data, pointFaces, counts, where) : decodeDifferences(data, pointFaces, counts, where);
+  const copies = decodeSeams(kernels, data, pointFaces, counts, where);
   const faces = pointFaces.map((p, corner) => starts[p] + copies[corner]);
   const point = new Int32Array(starts[nPoints]);
   for (let p = 0; p < nPoints; p++) point.fill(p, starts[p], starts[p + 1]);
   return { faces, point };
-}
-
-function decodeDifferences(data, pointFaces, counts, where) {
-  const contexts = Uint8Array.from(where, (corner) => Math.min(counts[pointFaces[corner]], MAX_SEAM_VERTICES));
-  const differences = decodeIntegers(data, where.length, contexts, "mesh");
-  const copies = new Uint32Array(pointFaces.length);
-  for (let i = 0, before = -1, copy = 0; i < where.length; i++) {
-    const p = pointFaces[where[i]];
-    copy = p === before ? copy + differences[i] : 0; // a point's first corner uses its first copy
-    if (copy < 0 || copy >= counts[p]) throw corrupt("mesh", "a corner uses a copy that does not exist");
-    copies[where[i]] = copy;
-    before = p;
-  }
-  return copies;
 }
 
 /** Corners of points with more than one copy, in order of point and corner. */

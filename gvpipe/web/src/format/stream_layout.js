@@ -7,7 +7,7 @@ import {
   BITSTREAM_MAGIC as MAGIC,
   BITSTREAM_MAX_NAME as MAX_NAME,
   BITSTREAM_MAX_SECTIONS as MAX_SECTIONS,
-  STREAM_LAYOUT_VERSION as VERSION,
+  BITSTREAM_VERSION as VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
 import { Cursor } from "./cursor.js";

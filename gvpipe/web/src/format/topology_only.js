@@ -27,7 +27,7 @@ export async function decodeTopology(kernels, mesh, order, { vertices, triangles
   }
   const parts = [draco, merges, loose].map((length) => cursor.take(length));
   const pointFaces = await decodeTriangles(...parts, nLoose, pointCount, triangles);
-  const { faces, point } = decodeCopies(kernels, cursor.take(counts), cursor.rest(), order, pointFaces, pointCount, false, false);
+  const { faces, point } = decodeCopies(kernels, cursor.take(counts), cursor.rest(), order, pointFaces, pointCount, false);
   if (point.length !== vertices || faces.length !== 3 * triangles) {
     const found = `${point.length} vertices and ${faces.length / 3} triangles`;
     throw new GeometryVideoError("corrupt", `the mesh has ${found}, the header says ${vertices} and ${triangles}; ${AGAIN}`);

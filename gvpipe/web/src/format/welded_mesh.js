@@ -19,19 +19,17 @@ import { smallestFirst } from "./topology_only.js";
  *
  * @param {import("../wasm/kernels.js").Kernels} kernels
  * @param {Uint8Array} mesh @param {Uint8Array} order sections
- * @param {boolean} across whether seams are coded across edges (`seams.js`)
- * @param {boolean} adaptive whether the stream is the adaptive one (section 5.9)
  * @param {{vertices: number, triangles: number}} most of the header
  * @returns {Promise<PointMesh>}
  */
-export async function decodePoints(kernels, mesh, order, across, adaptive, most) {
+export async function decodePoints(kernels, mesh, order, most) {
   const cursor = new Cursor(mesh, "mesh");
-  const flags = adaptive ? cursor.u8() : 0;
+  const flags = cursor.u8();
   if (flags > ADAPTIVE_MESH + ADAPTIVE_ORDER) throw cursor.corrupt(`flags ${flags} are unknown`);
   const stream = cursor.take(cursor.varint(cursor.left, "a length"));
-  const base = flags & ADAPTIVE_MESH ? await decodeAdaptiveMesh(kernels, stream, most) : await decodeBase(kernels, stream, new Uint8Array(0), most);
+  const base = flags & ADAPTIVE_MESH ? await decodeAdaptiveMesh(kernels, stream, most) : await decodeBase(stream, most);
   const pointFaces = smallestFirst(base.faces);
   const counts = cursor.take(cursor.varint(cursor.left, "a length"));
-  const { faces, point } = decodeCopies(kernels, counts, cursor.rest(), order, pointFaces, base.points.length / 3, across, Boolean(flags & ADAPTIVE_ORDER));
+  const { faces, point } = decodeCopies(kernels, counts, cursor.rest(), order, pointFaces, base.points.length / 3, Boolean(flags & ADAPTIVE_ORDER));
   return { faces, point, lattice: base.points, pointFaces };
 }

@@ -11,8 +11,7 @@ export class BlendedMotion {
   #header;
   #budget;
   #blend;
-  #point;
-  #moved; // (P, 3) of the frame last asked for
+  #moved; // (S, 3) of the frame last asked for
 
   /**
    * @param {import("../wasm/kernels.js").Kernels} kernels
@@ -20,15 +19,13 @@ export class BlendedMotion {
    * @param {import("./header.js").Header} header
    * @param {import("./surface.js").Surface} surface of the base frame @param {import("../format/budget.js").Budget} budget of the file
    */
-  constructor(kernels, data, header, { base, point, members, points }, budget) {
+  constructor(kernels, data, header, { base, points }, budget) {
     const weights = decodeWeights(kernels, data, points.causalNeighbours(), header.clusters);
-    const own = Float64Array.from({ length: 3 * members.length }, (_, i) => base[3 * members[Math.floor(i / 3)] + (i % 3)]);
     this.#kernels = kernels;
     this.#header = header;
     this.#budget = budget;
-    this.#blend = new Blend(own, weights, header.clusters);
-    this.#point = point;
-    this.#moved = new Float64Array(own.length);
+    this.#blend = new Blend(base, weights, header.clusters);
+    this.#moved = new Float64Array(base.length);
   }
 
   decode(data, name, frames) {
@@ -37,14 +34,8 @@ export class BlendedMotion {
   }
 
   predict(trajectories, place, predicted) {
-    const [point, moved] = [this.#point, this.#moved];
     this.#move(trajectories, place);
-    for (let slot = 0, i = 0; slot < point.length; slot++, i += 3) {
-      const p = 3 * point[slot];
-      predicted[i] = moved[p];
-      predicted[i + 1] = moved[p + 1];
-      predicted[i + 2] = moved[p + 2];
-    }
+    predicted.set(this.#moved);
   }
 
   /** Looks at every frame, or at as many, evenly spaced, as `looks` allows. */

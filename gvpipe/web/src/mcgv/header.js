@@ -1,7 +1,7 @@
 /** What the reader of an `mcgv` bitstream must know beside its sections. Mirrors `gvcodecs.mcgv.header.Header`. */
 
 import {
-  READER_BROWSER_VERSION as VERSION,
+  HEADER_VERSION as VERSION,
   SEGMENTS_HUGE as HUGE,
   HEADER_MAX_CLUSTERS as MAX_CLUSTERS,
   HEADER_MAX_SEGMENTS as MAX_SEGMENTS,
@@ -11,7 +11,7 @@ import {
   SEGMENTS_TINY as TINY,
   BASIS_MAX_COMPONENTS as MAX_COMPONENTS,
   TRAJECTORIES_PLANES as PLANES,
-  TRAJECTORY_HEADER_MAX_FINENESS as MAX_FINENESS,
+  HEADER_MAX_FINENESS as MAX_FINENESS,
   VIDEO_MAX_SIDE as MAX_SIDE,
   VIDEO_PROFILES as PROFILES,
 } from "../constants.js";
@@ -53,7 +53,7 @@ export function readHeader(header) {
   const settings = header.settings;
   if ("pictures" in settings) return withoutPictures(header);
   if (!PROFILES.has(settings.profile)) throw corrupt("header", `profile is ${quote(settings.profile)}`);
-  const [prediction, placement] = header.version === 1 ? ["affine", "charts"] : [settings.prediction, settings.placement];
+  const { prediction, placement } = settings;
   if (!PREDICTIONS.includes(prediction)) throw corrupt("header", `prediction is ${quote(prediction)}`);
   if (!PLACEMENTS.includes(placement)) throw corrupt("header", `placement is ${quote(placement)}`);
   const motion = readMotion(header);
@@ -72,7 +72,7 @@ export function readHeader(header) {
     outliers: "outliers" in settings,
     pictures: true,
   };
-  if (result.outliers && (settings.outliers !== true || header.version === 1 || images)) {
+  if (result.outliers && (settings.outliers !== true || images)) {
     throw corrupt("header", `outliers is ${quote(settings.outliers)}`);
   }
   if (result.width % result.block || result.height % result.block) {
@@ -101,7 +101,7 @@ function readMotion(header) {
 function withoutPictures(header) {
   const settings = header.settings;
   const alien = [...OF_PICTURES, "outliers"].filter((key) => key in settings);
-  if (settings.pictures !== false || header.version < 4 || alien.length || settings.prediction !== "blended") {
+  if (settings.pictures !== false || alien.length || settings.prediction !== "blended") {
     throw corrupt("header", `pictures is ${quote(settings.pictures)} beside ${quote(alien)}`);
   }
   const transformStep = checkNumber(settings, "transform_step", TINY, HUGE);
@@ -109,10 +109,10 @@ function withoutPictures(header) {
   return { prediction: "blended", ...known, residualStep: 1, images: null, outliers: false, pictures: false };
 }
 
-/** Mirrors `gvcodecs.mcgv.trajectory_header`. */
-function readImages({ version, frames, settings }, segments, prediction) {
+/** Mirrors `gvcodecs.mcgv.header.TrajectoryHeader`. */
+function readImages({ frames, settings }, segments, prediction) {
   const { transform, profile, components } = settings;
-  if (transform !== "klt" || version === 1 || prediction !== "blended") {
+  if (transform !== "klt" || prediction !== "blended") {
     throw corrupt("header", `transform is ${quote(transform)}, prediction ${quote(prediction)}`);
   }
   if (PROFILES.get(profile).codec !== "h264") throw corrupt("header", `profile is ${quote(profile)} beside transform`);

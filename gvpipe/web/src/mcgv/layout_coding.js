@@ -10,26 +10,25 @@ import { decodeIntegers } from "../format/integers.js";
 
 /**
  * @param {Uint8Array} data section `pixels`
- * @param {Int32Array} visits (S) each slot's place in the codec's order
+ * @param {number} n S
  * @param {import("./header.js").Header} header
  * @returns {Uint32Array} (S) row-major index of each slot's pixel in a plane, all distinct
  */
-export function decodePixels(data, visits, { width, height }) {
-  const n = visits.length;
+export function decodePixels(data, n, { width, height }) {
   const cursor = new Cursor(data, "pixels");
   const columns = cursor.take(cursor.varint(cursor.left, "a length"));
   const dx = decodeIntegers(columns, n, null, "pixels");
   const dy = decodeIntegers(cursor.rest(), n, Uint8Array.from(dx, (d) => Math.min(Math.abs(d), CONTEXTS - 1)), "pixels");
   const taken = new Uint8Array(width * height);
-  const byCodec = new Uint32Array(n);
+  const pixels = new Uint32Array(n);
   for (let i = 0, x = 0, y = 0; i < n; i++) {
     x += dx[i];
     y += dy[i];
     if (x < 0 || x >= width || y < 0 || y >= height) throw cursor.corrupt("a pixel lies outside the plane");
-    byCodec[i] = y * width + x;
-    if (taken[byCodec[i]]++) throw cursor.corrupt("two slots share a pixel");
+    pixels[i] = y * width + x;
+    if (taken[pixels[i]]++) throw cursor.corrupt("two slots share a pixel");
   }
-  return Uint32Array.from(visits, (v) => byCodec[v]);
+  return pixels;
 }
 
 /**
@@ -51,13 +50,12 @@ export function decodeClusters(data, pixels, { width, height, block, clusters })
 
 /**
  * @param {Uint8Array} data section `clusters` of placement halves
- * @param {Int32Array} visits (S) each slot's place in the codec's order
+ * @param {number} n S
  * @param {import("./header.js").Header} header
  * @returns {Uint16Array} (S) cluster of each slot, 0..K-1
  */
-export function decodeSlotClusters(data, visits, { clusters }) {
-  const byCodec = decodeRunning(data, visits.length, clusters);
-  return Uint16Array.from(visits, (v) => byCodec[v]);
+export function decodeSlotClusters(data, n, { clusters }) {
+  return Uint16Array.from(decodeRunning(data, n, clusters));
 }
 
 /** Clusters, each told by its difference from the one before. */

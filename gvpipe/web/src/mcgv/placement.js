@@ -15,17 +15,10 @@ export const SECTIONS = { charts: "pixels", tiles: "charts" };
  * @returns {ArrayLike<number>} (S) the pixel of each slot in a plane
  */
 export function placeSlots(data, header, surface) {
-  const { lattice, point, points, visits, nSlots } = surface;
+  const { lattice, points, nSlots } = surface;
   const { width, height, placement } = header;
   if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
-  if (placement === "charts") return decodePixels(data, visits, header);
-  if (placement === "halves") return place(lattice, piecesOf(surface), header);
-  const charts = decodeCharts(data, points.causalNeighbours());
-  return placeCharts(lattice, point.map((p) => charts[p]), header);
-}
-
-/** (S) the connected piece of the surface that each slot belongs to. */
-function piecesOf({ point, points }) {
-  const pieces = points.pieces();
-  return point.map((p) => pieces[p]);
+  if (placement === "charts") return decodePixels(data, nSlots, header);
+  if (placement === "halves") return place(lattice, points.pieces(), header);
+  return placeCharts(lattice, decodeCharts(data, points.causalNeighbours()), header);
 }

@@ -173,11 +173,11 @@ async function readMotion(payload, header, surface, kernels) {
     const placement = SECTIONS[header.placement];
     return { pixels: placeSlots(placement ? await payload.section(placement) : null, header, surface), motion: await blended() };
   }
-  const { lattice, visits, nSlots } = surface;
+  const { lattice, nSlots } = surface;
   const { width, height } = header;
   if (width * height < nSlots) throw corrupt("header", `planes of ${width}x${height} do not hold ${nSlots} samples`);
-  const charts = header.placement === "charts" ? decodePixels(await payload.section("pixels"), visits, header) : null;
+  const charts = header.placement === "charts" ? decodePixels(await payload.section("pixels"), nSlots, header) : null;
   const data = await payload.section("clusters");
-  const clusters = charts ? decodeClusters(data, charts, header) : decodeSlotClusters(data, visits, header);
+  const clusters = charts ? decodeClusters(data, charts, header) : decodeSlotClusters(data, nSlots, header);
   return { pixels: charts ?? place(lattice, clusters, header), motion: new AffineMotion(header, surface, clusters) };
 }

@@ -1,16 +1,16 @@
 /**
  * What the reader knows of the base frame. Mirrors `gvcodecs.mcgv.base.surface`.
  *
- * A *slot* is what a picture has a pixel for. In files of version 3 slots are the points that move: all vertices of a point
- * show one position, and vertices that stand still have neither sample nor motion. Before, every vertex was a slot.
+ * A *slot* is what a picture has a pixel for: a point that moves. All vertices of a point show one position, and vertices that
+ * stand still have neither sample nor motion.
  */
 
 import { SURFACE_STILL as STILL } from "../constants.js";
-import { checkCounts, decodeBase } from "../format/base_mesh.js";
+import { checkCounts } from "../format/base_mesh.js";
 import { corrupt } from "../format/errors.js";
 import { decodePoints } from "../format/welded_mesh.js";
 import { decodeFlags } from "../format/still_vertices.js";
-import { Points, weldVertices } from "./welded_points.js";
+import { Points } from "./welded_points.js";
 
 export class Surface {
   /**
@@ -19,10 +19,7 @@ export class Surface {
    * @param {Int32Array} parts.basePoints (V, 3) base positions, lattice units, flat
    * @param {Int32Array} parts.slot (V) the slot of each vertex; -1: it never moves
    * @param {Int32Array} parts.lattice (S, 3) the slots' base positions, lattice units, flat
-   * @param {Int32Array} parts.point (S) the point of each slot
-   * @param {Int32Array} parts.members (P) a slot of each point
-   * @param {Points} parts.points that a blend moves
-   * @param {Int32Array} parts.visits (S) each slot's place in the codec's order
+   * @param {Points} parts.points what joins the slots
    * @param {import("./header.js").Header} header
    */
   constructor(parts, { origin, baseStep }) {
@@ -36,7 +33,7 @@ export class Surface {
   }
 
   get nSlots() {
-    return this.visits.length;
+    return this.points.n;
   }
 
   /** Fill `positions (V, 3)` from those of the slots (S, 3); model units, flat. */
@@ -67,25 +64,10 @@ export class Surface {
  * @returns {Promise<Surface>}
  */
 export async function readSurface(payload, header, kernels) {
-  const parts = payload.header.version < 3 ? await readVertices(payload, kernels) : await readPoints(payload, kernels);
-  return new Surface(parts, header);
-}
-
-/** Files before version 3: every vertex is a slot. */
-async function readVertices(payload, kernels) {
-  const { points: lattice, faces, visits } = await decodeBase(kernels, await payload.section("mesh"), await payload.section("order"), payload.header);
-  checkCounts(payload.header, visits.length, faces);
-  const welded = weldVertices(lattice, faces, visits);
-  return { faces, basePoints: lattice, slot: Int32Array.from(visits.keys()), lattice, visits, ...welded };
-}
-
-async function readPoints(payload, kernels) {
   const { faces, point, lattice, pointFaces } = await decodePoints(
     kernels,
     await payload.section("mesh"),
     await payload.section("order"),
-    payload.header.version > 3,
-    payload.header.version > 4,
     payload.header,
   );
   checkCounts(payload.header, point.length, faces);
@@ -95,17 +77,14 @@ async function readPoints(payload, kernels) {
   if (!moves.length) throw corrupt(STILL, "one point at least has samples");
   const slots = new Int32Array(n).fill(-1); // of the points
   moves.forEach((p, slot) => (slots[p] = slot));
-  const own = Int32Array.from(moves.keys());
-  return {
+  const parts = {
     faces,
     basePoints: gather(lattice, point),
     slot: point.map((p) => slots[p]),
     lattice: gather(lattice, moves),
-    point: own,
-    members: own,
     points: new Points(Int32Array.from(pointFaces, (p) => slots[p]), moves.length),
-    visits: own,
   };
+  return new Surface(parts, header);
 }
 
 /** Rows of three, flat, one for each of the numbers. */

@@ -14,25 +14,22 @@ import { decodeVectors } from "../trajectory/coefficient_coding.js";
  * @param {Uint8Array} data section `trajectories.s` @param {string} name of the section, for messages
  * @param {Float64Array} samples (S, R) what the planes hold, steps, flat; filled with the slots' coefficients, model units
  * @param {{frames: number, components: number, step: number}} segment n, R, and the quantisation step, model units
- * @param {{rows: object[], clusters: number, point: Int32Array}} blend its matrix (P, 4K) as kernels take it, K, and the point of each
- *   slot (S)
+ * @param {{rows: object[], clusters: number, slots: number}} blend its matrix (S, 4K) as kernels take it, K, and S
  * @param {import("../format/budget.js").Budget} budget
  * @returns {import("../trajectory/basis.js").Basis}
  * @throws {GeometryVideoError} the section is not as gvpipe writes it
  */
-export function decodeSegment(kernels, data, name, samples, { frames, components, step }, { rows, clusters, point }, budget) {
+export function decodeSegment(kernels, data, name, samples, { frames, components, step }, { rows, clusters, slots }, budget) {
   const cursor = new Cursor(data, name);
   const [head, coded] = [cursor.block(), cursor.block()];
-  const basis = decodeBasis(kernels, head, frames, point.length, step, name, 3, budget);
+  const basis = decodeBasis(kernels, head, frames, slots, step, name, 3, budget);
   if (basis.components !== components) throw cursor.corrupt(`${basis.components} components where the header says ${components}`);
   const order = placed(kernels, independentOrder(4 * clusters));
   const transforms = decodeVectors(kernels, order, coded, components, step, name);
   readOutliers(cursor, samples);
-  const [predicted] = kernels.call("multiply", ...rows, transforms); // (P, R)
+  const [predicted] = kernels.call("multiply", ...rows, transforms); // (S, R)
   const own = kernels.view(predicted);
-  for (let slot = 0, i = 0; slot < point.length; slot++) {
-    for (let c = 0; c < components; c++, i++) samples[i] = samples[i] * step + own[point[slot] * components + c];
-  }
+  for (let i = 0; i < samples.length; i++) samples[i] = samples[i] * step + own[i];
   kernels.free(...order, transforms, predicted);
   return basis;
 }

@@ -133,12 +133,11 @@ export class TrajectoryReader {
   }
 }
 
-/** The blend's matrix (P, 4K), to be placed for each segment; K; and the point of each slot. */
-function readBlend(kernels, data, { clusters }, { base, point, members, points }) {
+/** The blend's matrix (P, 4K), to be placed for each segment; K; and S. */
+function readBlend(kernels, data, { clusters }, { base, points }) {
   const weights = decodeWeights(kernels, data, points.causalNeighbours(), clusters);
-  const own = Float64Array.from({ length: 3 * members.length }, (_, i) => base[3 * members[Math.floor(i / 3)] + (i % 3)]);
-  const coordinates = homogeneous(own);
-  const n = members.length;
+  const coordinates = homogeneous(base);
+  const n = points.n;
   const rows = Float64Array.from({ length: 4 * n }, (_, i) => (i % 4 < 3 ? coordinates[3 * (i >> 2) + (i % 4)] : 1));
   const parts = Float64Array.from(weights.weights, (weight) => weight / TOTAL);
   const influences = parts.length / n;
@@ -152,5 +151,5 @@ function readBlend(kernels, data, { clusters }, { base, point, members, points }
   const matrix = kernels.call("blend_rows", ...given, inverse);
   const taken = matrix.map((array) => ({ type: array.type, shape: array.shape, values: kernels.view(array).slice() }));
   kernels.free(...given, energies, inverse, ...matrix);
-  return { rows: taken, clusters, point };
+  return { rows: taken, clusters, slots: n };
 }

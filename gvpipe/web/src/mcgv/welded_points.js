@@ -1,6 +1,4 @@
-/** Points: what a blend moves. In files of version 3, the mesh's points that move. Mirrors `gvcodecs.mcgv.base.welded_points`. */
-
-import { previousEqual } from "../format/points.js";
+/** Points: what a blend moves, the mesh's points that move. Mirrors `gvcodecs.mcgv.base.welded_points`. */
 
 export class Points {
   /**
@@ -66,30 +64,4 @@ export class Points {
       if (a !== b && a >= 0 && b >= 0) use(Math.min(a, b), Math.max(a, b));
     }
   }
-}
-
-/**
- * Vertices at one base position as one point, as in files before version 3; points are numbered as their first vertices come in
- * the codec's order.
- *
- * @param {Int32Array} lattice (V, 3) base frame on its lattice, flat
- * @param {Uint32Array} faces (T, 3) flat
- * @param {Int32Array} visits (V) each vertex' place in the codec's order
- * @returns {{points: Points, point: Int32Array, members: Int32Array}} with the point of each vertex (V), and the first vertex of
- *   each point (P)
- */
-export function weldVertices(lattice, faces, visits) {
-  const n = visits.length;
-  const order = new Int32Array(n); // vertices in the codec's order
-  visits.forEach((place, v) => (order[place] = v));
-  const ordered = new Int32Array(3 * n);
-  for (let i = 0; i < ordered.length; i++) ordered[i] = lattice[3 * order[Math.floor(i / 3)] + (i % 3)];
-  const previous = previousEqual(ordered, 3);
-  const members = [];
-  const point = new Int32Array(n);
-  order.forEach((v, place) => {
-    point[v] = previous[place] < 0 ? members.push(v) - 1 : point[order[previous[place]]];
-  });
-  const points = new Points(Int32Array.from(faces, (v) => point[v]), members.length);
-  return { points, point, members: Int32Array.from(members) };
 }

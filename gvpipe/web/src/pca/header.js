@@ -2,7 +2,7 @@
 
 import {
   PCA_HEADER_MAX_SEGMENTS as MAX_SEGMENTS,
-  PCA_HEADER_VERSION_STILL as VERSION,
+  PCA_HEADER_VERSION as VERSION,
   PREDICTION_PREDICTORS as PREDICTORS,
 } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";

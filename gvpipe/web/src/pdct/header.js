@@ -2,8 +2,7 @@
 
 import {
   PDCT_HEADER_MAX_CLIPS as MAX_CLIPS,
-  PDCT_HEADER_VERSION_LIVE as VERSION,
-  PDCT_HEADER_VERSION_POINTS as VERSION_POINTS,
+  PDCT_HEADER_VERSION as VERSION,
   SEGMENTS_HUGE as HUGE,
   SEGMENTS_MAX_SEGMENT as MAX_SEGMENT,
 } from "../constants.js";
@@ -11,7 +10,7 @@ import { corrupt, quote } from "../format/errors.js";
 import { checkInteger } from "../format/payload.js";
 import { readSegments } from "../format/segments.js";
 
-export { VERSION, VERSION_POINTS };
+export { VERSION };
 
 /**
  * @typedef {object} Header
@@ -23,7 +22,7 @@ export { VERSION, VERSION_POINTS };
  */
 export function readHeader(header) {
   const { base } = header.settings;
-  const clip = header.version < VERSION ? 0 : checkInteger(header.settings, "clip", 1, MAX_SEGMENT);
+  const clip = "clip" in header.settings ? checkInteger(header.settings, "clip", 1, MAX_SEGMENT) : 0;
   const clips = clip ? Math.ceil(header.frames / clip) : readSegments(header, MAX_CLIPS, "clips");
   if (clips > MAX_CLIPS) throw corrupt("header", `${header.frames} frames in clips of ${clip}`);
   const isLattice = Array.isArray(base) && base.length === 4 && base.every((v) => typeof v === "number" && Math.abs(v) <= HUGE);

@@ -4,12 +4,12 @@
  */
 
 import { PDCT_READER_BYTES_PER_POINT as BYTES_PER_POINT, PDCT_READER_SECONDS_PER_POINT as SECONDS_PER_POINT } from "../constants.js";
-import { checkCounts, decodeBase } from "../format/base_mesh.js";
+import { checkCounts } from "../format/base_mesh.js";
 import { previousEqual } from "../format/points.js";
 import { Recent } from "../format/recent.js";
 import { decodePoints } from "../format/welded_mesh.js";
 import { Clip } from "./clip.js";
-import { VERSION, VERSION_POINTS, readHeader } from "./header.js";
+import { VERSION, readHeader } from "./header.js";
 import { SECTION as STILL, decodeStill } from "./still_points.js";
 
 export { VERSION };
@@ -20,7 +20,8 @@ export class PdctReader {
   #payload;
   #header;
   #kernels;
-  #mesh; // {faces, point, coded, lattice, traversal}
+  #mesh; // {faces, point, lattice}
+  #shared; // (V) the point of each vertex; where frames are written as they come, that of the base frame
   #surface; // what clips share
   #still;
   #clips; // by number, promises
@@ -34,21 +35,21 @@ export class PdctReader {
   static async open(payload, kernels) {
     const header = readHeader(payload.header);
     const sections = [await payload.section("mesh"), await payload.section("order")];
-    const read = payload.header.version === VERSION_POINTS ? readPoints : readVertices;
-    const mesh = await read(kernels, ...sections, payload.header);
+    const mesh = await decodePoints(kernels, ...sections, payload.header);
     checkCounts(payload.header, mesh.point.length, mesh.faces);
     const still = payload.sections.has(STILL) ? await payload.section(STILL) : null;
     return new PdctReader(payload, header, kernels, mesh, still);
   }
 
   constructor(payload, header, kernels, mesh, still) {
-    const { lattice, traversal } = mesh;
+    const { lattice, point } = mesh;
     const [points, step] = [lattice.length / 3, header.base[3]];
     const base = Float64Array.from(lattice, (index, i) => header.base[i % 3] + index * step);
     this.#still = still ? decodeStill(still, base) : { points: new Int32Array(0), positions: new Float32Array(0) };
     const stands = new Uint8Array(points);
     for (const point of this.#still.points) stands[point] = 1;
-    this.#surface = { base, traversal: traversal.filter((point) => !stands[point]) };
+    this.#surface = { base, traversal: Int32Array.from(stands.keys()).filter((p) => !stands[p]) };
+    this.#shared = header.clip ? firstEqual(lattice, point) : point;
     payload.budget.keep(`${points} points`, BYTES_PER_POINT * points, SECONDS_PER_POINT * points);
     this.#clips = new Recent((c) => this.#open(c), KEPT);
     this.#payload = payload;
@@ -62,9 +63,9 @@ export class PdctReader {
     return this.#mesh.faces;
   }
 
-  /** `Int32Array` (V): the point of each vertex; of versions 1 and 3, that of the base frame. */
+  /** `Int32Array` (V): the point of each vertex; where frames are written as they come, that of the base frame. */
   get points() {
-    return this.#mesh.point;
+    return this.#shared;
   }
 
   /** Vertex counts of the levels of detail: the whole mesh alone. */
@@ -107,10 +108,10 @@ export class PdctReader {
   /** Fill `target (V, 3)` from positions of the points, which get those that stand still. */
   #spread(own, target) {
     const { points, positions } = this.#still;
-    points.forEach((point, i) => own.set(positions.subarray(3 * i, 3 * i + 3), 3 * point));
-    const { coded } = this.#mesh;
-    for (let v = 0; v < coded.length; v++) {
-      for (let axis = 0; axis < 3; axis++) target[3 * v + axis] = own[3 * coded[v] + axis];
+    points.forEach((p, i) => own.set(positions.subarray(3 * i, 3 * i + 3), 3 * p));
+    const { point } = this.#mesh;
+    for (let v = 0; v < point.length; v++) {
+      for (let axis = 0; axis < 3; axis++) target[3 * v + axis] = own[3 * point[v] + axis];
     }
   }
 
@@ -122,17 +123,9 @@ export class PdctReader {
   }
 }
 
-/** Files of versions 1 and 3: every vertex is a point. */
-async function readVertices(kernels, mesh, order, header) {
-  const { points: lattice, faces, visits } = await decodeBase(kernels, mesh, order, header);
-  const traversal = new Int32Array(visits.length); // the codec's order
-  visits.forEach((visit, v) => (traversal[visit] = v));
-  const point = new Int32Array(visits.length);
-  previousEqual(lattice, 3).forEach((previous, v) => (point[v] = previous < 0 ? v : point[previous]));
-  return { faces, point, coded: Int32Array.from(visits.keys()), lattice, traversal };
-}
-
-async function readPoints(kernels, mesh, order, header) {
-  const { faces, point, lattice } = await decodePoints(kernels, mesh, order, false, false, header);
-  return { faces, point, coded: point, lattice, traversal: Int32Array.from({ length: lattice.length / 3 }, (_, p) => p) };
+/** (V) the first of the points at each vertex's base position. */
+function firstEqual(lattice, point) {
+  const first = new Int32Array(lattice.length / 3);
+  previousEqual(lattice, 3).forEach((previous, p) => (first[p] = previous < 0 ? p : first[previous]));
+  return point.map((p) => first[p]);
 }

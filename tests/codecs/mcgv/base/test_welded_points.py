@@ -1,22 +1,11 @@
-"""Points are welded vertices: their numbers, and their sides."""
+"""Points that move, and their sides."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gvcodecs.mcgv.base.welded_points import Points, weld_vertices
+from gvcodecs.mcgv.base.welded_points import Points
 from gvpipe.connectivity.welded_mesh import PointMesh
-
-
-def test_points_are_numbered_along_the_codecs_order() -> None:
-    lattice = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
-    faces = np.array([[0, 1, 2], [3, 5, 4]], np.int32)
-    visits = np.array([3, 0, 5, 4, 1, 2])  # the codec goes through vertices 1 4 5 0 3 2
-    points, point, members = weld_vertices(lattice, faces, visits)
-    assert members.tolist() == [1, 4, 5, 0]
-    assert point.tolist() == [3, 0, 1, 0, 1, 2]
-    assert points.faces.tolist() == [[3, 0, 1], [0, 2, 1]]
-    assert points.neighbours.toarray().tolist() == [[0, 1, 1, 1], [1, 0, 1, 1], [1, 1, 0, 0], [1, 1, 0, 0]]
 
 
 def test_points_that_move_keep_the_sides_between_them() -> None:

@@ -43,7 +43,7 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
     vertices = draw.permutation(n)
     points = homogeneous(base)
     result = np.zeros((n, 3), np.float32)
-    skinned = skinned_points(vertices, base, np.arange(n), points, weights)
+    skinned = skinned_points(vertices, base, points, weights)
     sites = Sites(vertices, pixels, 0.01 * (np.arange(256.0) - 128))
     rebuild_blended(samples, sites, skinned, in_rows(transforms), result)
     wanted = base + apply_weights(points, weights, transforms)
@@ -55,18 +55,18 @@ def test_rebuilding_is_base_blend_and_residual() -> None:
 def test_frames_without_pictures_are_those_of_no_residual(n_vertices: int) -> None:
     """To the bit, whatever the order of vertices; some points follow one cluster, some four."""
     draw = np.random.default_rng(n_vertices)
-    n_points, n_frames = n_vertices // 2 + 1, 3
-    points, parts = draw.integers(0, n_points, n_vertices), np.zeros((n_points, INFLUENCES), np.int32)
-    for point, used in enumerate(draw.integers(1, INFLUENCES + 1, n_points)):
+    n_slots, n_frames = n_vertices // 2 + 1, 3
+    parts = np.zeros((n_slots, INFLUENCES), np.int32)
+    for point, used in enumerate(draw.integers(1, INFLUENCES + 1, n_slots)):
         parts[point, :used] = draw.multinomial(TOTAL - used, np.ones(used) / used) + 1
     weights = Weights(np.where(parts > 0, draw.integers(0, 5, parts.shape), 0).astype(np.int32), parts)
-    base, coordinates = draw.standard_normal((n_vertices, 3)), homogeneous(draw.standard_normal((n_points, 3)))
-    vertices, slots = (draw.permutation(n_vertices) for _ in range(2))
+    base, coordinates = draw.standard_normal((n_slots, 3)), homogeneous(draw.standard_normal((n_slots, 3)))
+    vertices, slots = draw.permutation(n_vertices), draw.integers(0, n_slots, n_vertices)
     transforms = np.stack([in_rows(each) for each in draw.standard_normal((n_frames, 5, 4, 3))])
     found, wanted = (np.zeros((n_frames, n_vertices, 3), np.float32) for _ in range(2))
-    rebuild_without_pictures(vertices, slots, base, points, coordinates, weights, transforms, found)
+    rebuild_without_pictures(vertices, slots, base, coordinates, weights, transforms, found)
     sites = Sites(vertices, np.zeros(n_vertices, np.int64), np.zeros(1))
-    skinned = skinned_points(slots, base, points, coordinates, weights)
+    skinned = skinned_points(slots, base, coordinates, weights)
     for frame, own in zip(wanted, transforms, strict=True):
         rebuild_blended(np.zeros((3, 1), np.uint8), sites, skinned, own, frame)
     assert np.array_equal(found, wanted)

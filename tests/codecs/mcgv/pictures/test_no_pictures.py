@@ -124,8 +124,3 @@ def test_pictures_stay_where_they_pay() -> None:
 def test_headers_are_hostile(wrong: dict[str, Any], stream: Bitstream) -> None:
     with pytest.raises(CorruptFile, match="header"):
         open_reader(dataclasses.replace(stream, header={**stream.header, **wrong})).read(0, 1)
-
-
-def test_version_3_has_pictures(stream: Bitstream) -> None:
-    with pytest.raises(CorruptFile, match="pictures"):
-        open_reader(dataclasses.replace(stream, version=3))
