@@ -1,3 +1,3 @@
 """The version, in a room of its own, so that parts which note it import nothing above them."""
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"

@@ -48,7 +48,7 @@ class StlLoader:
             InputError: corners that were one vertex in the first file are apart in this one.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
-        exact, solids = _load_corners(path)
+        exact, solids, lost = _load_corners(path)
         if self._first is None:
             self._origin = choose_origin(exact[None])
         corners = narrow(exact[None], self._origin)[0]
@@ -70,11 +70,11 @@ class StlLoader:
                 f"corner {corner % 3} of triangle {corner // 3} shares a vertex with another in {self._first.name} "
                 f"but not in {path.name}; STL has no vertices of its own: export OBJ, PLY or GLB"
             )
-        return Mesh(exact[self._corner_of], self._faces, parts=_make_parts(solids, self._faces))
+        return Mesh(exact[self._corner_of], self._faces, parts=_make_parts(solids, self._faces), not_carried=lost)
 
 
-def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]]]:
-    """All corners, ``(3 T, 3)``, and the solids' names and triangles; binary files have one solid."""
+def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]], tuple[str, ...]]:
+    """All corners, ``(3 T, 3)``, the solids' names and triangles, and what is not read; binary files have one solid."""
     import trimesh
 
     data = path.read_bytes()
@@ -83,7 +83,17 @@ def _load_corners(path: Path) -> tuple[Float64, list[tuple[str, int]]]:
     solids = [np.asarray(solid.vertices, np.float64)[solid.faces.reshape(-1)] for solid in scene.geometry.values()]
     if not any(map(len, solids)):
         raise ValueError("it has no triangles")
-    return np.concatenate(solids), [(name, len(solid) // 3) for name, solid in zip(scene.geometry, solids, strict=True)]
+    sizes = [(name, len(solid) // 3) for name, solid in zip(scene.geometry, solids, strict=True)]
+    return np.concatenate(solids), sizes, _lost_colors(data)
+
+
+def _lost_colors(data: bytes) -> tuple[str, ...]:
+    """Colours of a binary file, which some programs write into its header or behind each triangle."""
+    n_triangles = struct.unpack_from("<I", data, HEADER_BYTES)[0] if len(data) >= START else -1
+    if len(data) != START + n_triangles * RECORD.itemsize:
+        return ()
+    has_colors = b"COLOR=" in data[:HEADER_BYTES] or np.frombuffer(data, RECORD, offset=START)["attribute"].any()
+    return ("colours of triangles",) if has_colors else ()
 
 
 def _check_whole(data: bytes) -> None:

@@ -41,7 +41,7 @@ def test_equal_materials_of_frames(tmp_path: Path) -> None:
 
 
 def test_statements_of_obj(tmp_path: Path) -> None:
-    text = f"# a comment\ns off\ns 1\n{SQUARE}s 3\nl 1 2 3\nl 2 3\np 1\ncurv 0 1 1 2\nACME thing\n"
+    text = f"# a comment\ns 1\n{SQUARE}s 3\nl 1 2 3\nl 2 3\np 1\ncurv 0 1 1 2\nACME thing\n"
     (tmp_path / "a.obj").write_text(text)
     named = ("statement 'ACME'", "statement 'curv'", "statement 'l' (2)", "statement 'p'", "statement 's'")
     assert gvpipe.read(tmp_path / "a.obj").not_carried == named
@@ -151,7 +151,7 @@ def test_what_each_frame_of_gltf_shows(tmp_path: Path) -> None:
 
 def test_options_of_material_files(tmp_path: Path) -> None:
     Image.new("RGB", (8, 8)).save(tmp_path / "t.png")
-    said = "Ka 0 0 0\nKs 0 0 0\nillum 2\nNi 1.0\nmap_Kd -mm 0 1 -s 2 2 1 -o 0 0 0 -blendu on t.png\n"
+    said = "Ka 1 1 1\nKs 0.5 0.5 0.5\nmap_Ka t.png\nillum 2\nNi 1.0\nmap_Kd -mm 0 1 -s 2 2 1 -o 0 0 0 -blendu on t.png\n"
     (tmp_path / "m.mtl").write_text(f"newmtl a\n{said}")
     (tmp_path / "a.obj").write_text(f"mtllib m.mtl\n{SQUARE.replace('vt 1 1', 'vt 1 1 0')}")
     found = gvpipe.read(tmp_path / "a.obj")
@@ -162,8 +162,49 @@ def test_options_of_material_files(tmp_path: Path) -> None:
     found = gvpipe.read(tmp_path / "a.obj")
     named = {"-blendu": "kd", "-bm": "ke", "-mm": "kd", "-s": "kd", "-t": "kd"}
     options = tuple(f"option {name} of map_{of}" for name, of in named.items())
-    statements = tuple(f"material statement {name}" for name in ("illum", "ka", "ks"))
+    statements = tuple(f"material statement {name}" for name in ("illum", "ks"))
     assert found.not_carried == ("third numbers of 'vt'", *statements, *options)
     assert found.materials[0].ior == 1.33
     gvpipe.write(found, tmp_path / "out.obj")
     assert gvpipe.read(tmp_path / "out.obj").materials[0].ior == 1.33
+
+
+def test_smoothing_of_some_faces(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(SQUARE.replace("f 2", "s off\nf 2").replace("usemtl a", "s 1"))
+    assert gvpipe.read(tmp_path / "a.obj").not_carried == ("smoothing of some faces alone",)
+
+
+def test_later_colours_of_obj(tmp_path: Path) -> None:
+    (tmp_path / "0.obj").write_text(SQUARE)
+    (tmp_path / "1.obj").write_text(SQUARE.replace("v 0 0 0", "v 0 0 0 1 0 0"))
+    assert gvpipe.read(tmp_path).not_carried == ("color of later frames",)
+
+
+def test_texture_coordinates_of_some_faces_of_ply(tmp_path: Path) -> None:
+    head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n"
+    head += "property float t\nelement face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n"
+    rows = "0 0 0 9 9\n1 0 0 9 9\n0 1 0 9 9\n1 1 0 9 9\n3 0 1 2 6 0.5 0 1 0 0 1\n3 1 3 2 0\n"
+    (tmp_path / "a.ply").write_text(f"{head}end_header\n{rows}")
+    found = gvpipe.read(tmp_path / "a.ply")
+    uv = found.attributes["uv"]
+    assert np.asarray(uv.values)[np.asarray(uv.indices)].tolist() == [[0.5, 0], [1, 0], [0, 1], [0, 0], [0, 0], [0, 0]]
+    assert found.not_carried == ("s, t",)
+
+
+def test_colours_of_some_faces_of_off(tmp_path: Path) -> None:
+    (tmp_path / "a.off").write_text("OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 255 0 0\n3 1 3 2\n")
+    found = gvpipe.read(tmp_path / "a.off")
+    assert np.asarray(found.attributes["color"].values).tolist() == [[255, 0, 0, 255], [255, 255, 255, 255]]
+    (tmp_path / "b.off").write_text("OFF\n3 1 0\n0 0 0 1 0 0 1\n1 0 0 0 1 0 1\n0 1 0 0 0 1 1\n3 0 1 2 7\n")
+    found = gvpipe.read(tmp_path / "b.off")
+    assert found.not_carried == ("colours of faces by a palette",) and "color" in found.attributes
+    (tmp_path / "c.off").write_text("COFF\n3 1 0\n0 0 0 1 0 0\n1 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n")
+    assert gvpipe.read(tmp_path / "c.off").not_carried == ("numbers of vertices behind their coordinates",)
+
+
+def test_colours_of_stl(tmp_path: Path) -> None:
+    gvpipe.write(gvpipe.MeshSequence(np.eye(3, dtype=np.float32)[None], np.array([[0, 1, 2]], np.int32)), tmp_path / "a.stl")
+    assert gvpipe.read(tmp_path / "a.stl").not_carried == ()
+    data = (tmp_path / "a.stl").read_bytes()
+    (tmp_path / "a.stl").write_bytes(data[:-2] + b"\x1f\x80")
+    assert gvpipe.read(tmp_path / "a.stl").not_carried == ("colours of triangles",)

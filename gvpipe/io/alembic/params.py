@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,13 @@ def layers_of(schema: Any, polygons: SceneMesh, time: float, turn: Float64) -> t
     return tuple(layers), left
 
 
+def _labelled(schema: Any) -> list[tuple[str, str, str, Any]]:
+    """What programs add, with the name of the field or attribute that it becomes."""
+    colors = [name for name, kind, _ in _others(schema) if kind == "color"]
+    labels = {name: f"color{number}" if number else "color" for number, name in enumerate(colors)}
+    return [(labels.get(name, name), name, kind, param) for name, kind, param in _others(schema)]
+
+
 def changing_normals(schema: Any) -> bool:
     """Whether a mesh has normals that change over time."""
     param = schema.getNormalsParam() if hasattr(schema, "getNormalsParam") else None
@@ -76,10 +84,7 @@ def changing_normals(schema: Any) -> bool:
 def sampled_of(schema: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:
     """The parameters of a mesh that change over time and can be fields: per vertex or polygon, not indexed, no uv."""
     found: dict[str, Sampled] = {}
-    n_colors = 0
-    for name, kind, param in _others(schema):
-        label = name if kind != "color" else f"color{n_colors}" if n_colors else "color"
-        n_colors += kind == "color"
+    for label, name, kind, param in _labelled(schema):
         if kind == "uv" or param.isIndexed() or param.getNumSamples() < 2 or param.isConstant():
             continue
         layer = _layer(name, kind, param, polygons, time)
@@ -101,9 +106,13 @@ class Values:
         return values if self._width == 1 else values.reshape(len(values), -1)
 
 
-def left_of(node: Node) -> list[str]:
-    """What a mesh has beside positions, polygons and layers, by name."""
+def left_of(node: Node, fields: Collection[str]) -> list[str]:
+    """What a mesh has beside positions, polygons, layers and the fields of these names, by name."""
     schema, left = node.schema, []
+    uv = schema.getUVsParam()
+    moving = [("uv", uv)] if uv and uv.valid() else []
+    moving += [(name, param) for label, name, _, param in _labelled(schema) if label not in fields]
+    left += [f"animation of parameter {name}" for name, param in moving if param.getNumSamples() > 1 and not param.isConstant()]
     if schema.getVelocitiesProperty().valid():
         left.append("velocities")
     taken = {name for name, _, _ in _others(schema)}

@@ -81,7 +81,8 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
     sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     left.add_all(misfits("parameter", [*(names for _, names in read), torn]))
-    left.add_all(name for motion in motions for name in left_of(motion.node))
+    for motion, own in zip(motions, sampled, strict=True):
+        left.add_all(left_of(motion.node, own if len(times) > 1 else ()))
     sequence = MeshSequence(
         frames,
         joined.faces,

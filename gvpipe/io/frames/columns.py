@@ -10,6 +10,7 @@ Normals per corner cannot be a field: fields have one row per vertex or triangle
 from __future__ import annotations
 
 import contextlib
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,7 @@ from gvpipe.io.frames.frame_files import FrameFiles
 from gvpipe.io.mesh import FrameValues, Mesh, too_wide
 from gvpipe.io.normals.own import FIRST_NORMALS, entries_of, own_rule
 
+COUNT = re.compile(r" \(\d+\)$")  # of things that were met several times
 SAMPLES = 3  # files that are compared with the first before all are
 
 
@@ -68,7 +70,8 @@ def split_columns(frames: FrameFiles) -> Columns:
     for name in moving:
         frames.keep(name, given[name].values, 1)
     meshes = [frames.load(frame) for frame in samples] if given else []
-    late = _late_names(frames, meshes, {*given, *left})
+    looked_at = meshes or _last(frames)
+    late = sorted({name for mesh in looked_at for name in mesh.animated} - {*given, *left})
     settled = {
         name
         for name in statics
@@ -95,15 +98,19 @@ def split_columns(frames: FrameFiles) -> Columns:
     }
     attributes = {name: each for name, each in statics.items() if name not in fields}
     notes = (FIRST_NORMALS,) if corners else ()
-    return Columns(attributes, fields, notes, (*too_wide(left), *(f"{name} of later frames" for name in late)))
+    known = {COUNT.sub("", name) for name in frames.first.not_carried}
+    more = [name for mesh in looked_at for name in mesh.not_carried if COUNT.sub("", name) not in known]
+    return Columns(
+        attributes, fields, notes, (*too_wide(left), *(f"{name} of later frames" for name in late), *dict.fromkeys(more))
+    )
 
 
-def _late_names(frames: FrameFiles, meshes: list[Mesh], known: set[str]) -> list[str]:
-    """Names that the first frame lacks and one that was looked at has, or the last one where it lies on disk."""
-    if not meshes and len(frames.paths) > 1 and not is_elsewhere(frames.paths[-1]):
+def _last(frames: FrameFiles) -> list[Mesh]:
+    """The last of several frames, where it lies on disk and can be read."""
+    if len(frames.paths) > 1 and not is_elsewhere(frames.paths[-1]):
         with contextlib.suppress(InputError):  # which whoever asks for that frame gets
-            meshes = [frames.load(len(frames.paths) - 1)]
-    return sorted({name for mesh in meshes for name in mesh.animated} - known)
+            return [frames.load(len(frames.paths) - 1)]
+    return []
 
 
 def _keep(frames: FrameFiles, names: set[str], given: dict[str, FrameValues], n_frames: int) -> None:

@@ -7,7 +7,6 @@ write one for each (`gvpipe.io.obj.changes`).
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,12 @@ import numpy as np
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.fetching import is_elsewhere
 from gvpipe.io.formats import FRAME_FORMATS
+from gvpipe.io.frames.columns import COUNT
 from gvpipe.io.frames.frame_files import load_mesh
 from gvpipe.io.mesh import Mesh
 
 HAVE_LOOKS = (".obj", ".ply", ".gltf", ".glb")
 SAMPLES = 3  # files that are compared with the first
-COUNT = re.compile(r" \(\d+\)$")
 CHANGES = "materials and textures of later frames"
 
 

@@ -14,7 +14,7 @@ from gvpipe.io.damage import unknown_name
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.interpolation import MODES, Curve
-from gvpipe.io.gltf.json_fields import Json, child, index, integer, objects, text
+from gvpipe.io.gltf.json_fields import Json, child, index, indices, integer, objects, text
 from gvpipe.io.gltf.pointers import animated_property
 
 WIDTHS = {
@@ -63,16 +63,36 @@ NO_CLIP = Clip("", {})
 
 
 def clip_names(document: Document) -> list[str]:
-    """Names of the file's animations that move anything."""
-    clips = document.items("animations")
+    """Names of the file's animations that move a mesh: not those of cameras and lights alone."""
+    moving, n_nodes = moving_nodes(document), len(document.items("nodes"))
     return [
         text(clip, "name") or f"animation_{number}"
-        for number, clip in enumerate(clips)
+        for number, clip in enumerate(document.items("animations"))
         if any(
-            animated_property(document, child(channel, "target", "a channel"), "a channel")
+            node in moving or node >= n_nodes  # which is refused when it is read
             for channel in objects(clip, "channels", f"animation_{number}")
+            for node, _ in animated_property(document, child(channel, "target", "a channel"), "a channel")
         )
     ]
+
+
+def moving_nodes(document: Document) -> set[int]:
+    """Nodes whose properties move a mesh: those that show one, joints of their skins, and all above them."""
+    nodes, skins = document.items("nodes"), document.items("skins")
+    above = {
+        one: number for number, node in enumerate(nodes) for one in indices(node, "children", f"node {number}", len(nodes))
+    }
+    pending = [number for number, node in enumerate(nodes) if "mesh" in node]
+    for number in list(pending):
+        skin = index(nodes[number], "skin", f"node {number}", len(skins))
+        pending += [] if skin is None else indices(skins[skin], "joints", f"skin {skin}", len(nodes))
+    found: set[int] = set()
+    while pending:
+        number = pending.pop()
+        if number not in found:
+            found.add(number)
+            pending += [above[number]] if number in above else []
+    return found
 
 
 def find_clip(document: Document, name: str | None) -> int:

@@ -15,6 +15,7 @@ import numpy as np
 from gvpipe.foundation.arrays import Array, Float32, Float64, Int32, Int64
 from gvpipe.io.gltf.accessors import Accessors
 from gvpipe.io.gltf.attribute_names import ANY, FLOATS, KINDS, MEANT, SET, STORED, Read, own_name
+from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.json_fields import Json, child, extension, index, integer, objects, text
 
 DRACO = "KHR_draco_mesh_compression"
@@ -184,7 +185,7 @@ def _read_block(accessors: Accessors, read: Read, primitive: Json, where: str, m
             arrays[name] = read(name, KINDS[base], STORED if base == "COLOR" else FLOATS)
         elif base in ("JOINTS", "WEIGHTS"):
             arrays[name] = read(name, ("VEC4",), FLOATS if base == "WEIGHTS" else STORED)
-        elif name.startswith("_"):
+        elif name.startswith("_") and not is_matrix(accessors.document, names.get(name)):
             arrays[name] = read(name, ANY, MEANT)
     short = next((name for name, values in arrays.items() if len(values) != len(positions)), None)
     if short:
@@ -196,6 +197,14 @@ def _read_block(accessors: Accessors, read: Read, primitive: Json, where: str, m
     )
     attributes = {own: _as_own(own, values) for name, values in arrays.items() if (own := own_name(name))}
     return Block(positions, attributes, joints, weights, morphs)
+
+
+def is_matrix(document: Document, number: object) -> bool:
+    """Whether an accessor is of matrices, which attributes do not hold."""
+    items = document.items("accessors")
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(items):
+        return False
+    return text(items[number], "type").startswith("MAT")
 
 
 def _as_own(name: str, values: Array) -> Array:

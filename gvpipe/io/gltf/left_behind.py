@@ -8,10 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 from gvpipe.io.gltf.attribute_names import is_taken
-from gvpipe.io.gltf.clips import FPS
+from gvpipe.io.gltf.clips import FPS, moving_nodes
 from gvpipe.io.gltf.document import LOOKS, TAKEN, Document
+from gvpipe.io.gltf.geometry import is_matrix
 from gvpipe.io.gltf.instances import DEFAULTS, EXTENSION
-from gvpipe.io.gltf.json_fields import child, extension, integer, objects
+from gvpipe.io.gltf.json_fields import Json, child, extension, integer, objects
 from gvpipe.io.gltf.looks import TAKEN_LOOKS
 from gvpipe.io.gltf.pointers import animated_property, pointer_of, shown_pointer
 from gvpipe.io.left_behind import LeftBehind
@@ -31,8 +32,9 @@ def left_behind(document: Document, in_scene: set[int]) -> tuple[str, ...]:
         left.add_all(f"attribute {name} of instances" for name in given if name not in DEFAULTS)
     if any("camera" in node for node in document.items("nodes")):
         left.add("cameras", len(document.items("cameras")))
-    met, n_extras = _met(document.tree)
-    left.add("extras", n_extras)
+    met, extras = _met(document.tree)
+    for key, count in extras.items():
+        left.add(f"extras {key!r}" if key else "extras", count)
     for name, count in met.items():
         if name not in TAKEN and name not in TAKEN_LOOKS:
             left.add(f"material extension {name}" if name.startswith(LOOKS) else f"extension {name}", count)
@@ -40,31 +42,44 @@ def left_behind(document: Document, in_scene: set[int]) -> tuple[str, ...]:
         for primitive in objects(mesh, "primitives", "a mesh"):
             left.add("points and lines", integer(primitive, "mode", "a primitive", TRIANGLES) < TRIANGLES)
             names = child(primitive, "attributes", "a primitive")
-            left.add_all(f"vertex attribute {name}" for name in names if not is_taken(name))
+            lost = [name for name, number in names.items() if not is_taken(name) or is_matrix(document, number)]
+            left.add_all(f"vertex attribute {name}" for name in lost)
             targets = objects(primitive, "targets", "a primitive")
             left.add_all({f"{name} of morph targets" for target in targets for name in target if name not in MORPHED})
+    moving = moving_nodes(document)
     for animation in document.items("animations"):  # of clips that are not read, too: no other note names what they lose
         for channel in objects(animation, "channels", "an animation"):
             target = child(channel, "target", "a channel")
-            if not animated_property(document, target, "a channel"):
+            moved = animated_property(document, target, "a channel")
+            if not moved:
                 left.add(f"animation of {shown_pointer(pointer_of(target, 'a channel')) or 'nothing that is known'}")
+            elif not any(node in moving for node, _ in moved):
+                left.add("animation of nodes without a mesh")
     return left.names
 
 
-def _met(tree: Any) -> tuple[dict[str, int], int]:
-    """How often each extension is used, wherever in the file, and how many objects have extras."""
+def _met(tree: Json) -> tuple[dict[str, int], dict[str, int]]:
+    """How often each extension is used, wherever in the file, and each key of extras.
+
+    What the file itself has of an extension, such as a list of lights, counts where nothing else has it.
+    """
     found: dict[str, int] = {}
-    pending, n_met, n_extras = [tree], 0, 0
+    extras: dict[str, int] = {}
+    pending: list[Any] = [{**tree, "extensions": {}}]
+    n_met = 0
     while pending and n_met < MOST:
         value = pending.pop()
         n_met += 1
         if isinstance(value, dict):
-            extras = value.get("extras")
-            n_extras += bool(set(extras) - {FPS} if isinstance(extras, dict) else extras)
+            given = value.get("extras")
+            for key in given if isinstance(given, dict) else ("",) if given else ():
+                extras[str(key)] = extras.get(str(key), 0) + (key != FPS)
             extensions = value.get("extensions")
             for name in extensions if isinstance(extensions, dict) else ():
                 found[str(name)] = found.get(str(name), 0) + 1
             pending += [each for each in value.values() if isinstance(each, dict | list)]
         elif isinstance(value, list):
             pending += [each for each in value if isinstance(each, dict | list)]
-    return found, n_extras
+    own = tree.get("extensions")
+    found |= {str(name): 1 for name in (own if isinstance(own, dict) else ()) if name not in found}
+    return found, extras

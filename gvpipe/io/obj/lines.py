@@ -89,11 +89,15 @@ class Lines:
         is_open = self._heads[0] > ord(" ")
         for keyword in TABLES:
             is_open &= ~self.is_kind(keyword)
+        smoothing = set()
         for line in np.flatnonzero(is_open).tolist():
             keyword, *rest = self._text[self._starts[line] : self._ends[line]].tobytes().split() or [b""]
             is_plain = keyword == b"s" and rest in ([b"off"], [b"0"], [b"1"])
+            smoothing |= {rest[0] == b"1"} if is_plain else set()
             if keyword not in NAMED and not is_plain:
                 left.add(f"statement {decode_name(keyword)[:20]!r}")
+        if len(smoothing) > 1 and not self.is_kind(b"vn").any():  # normals say which edges are hard
+            left.add("smoothing of some faces alone")
         return left.names
 
     def deep_uv(self) -> tuple[str, ...]:

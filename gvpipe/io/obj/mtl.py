@@ -12,8 +12,9 @@
 | ``Ni`` above 1 | index of refraction; many programs write 1, which light passes straight, and mean none |
 | ``-o``, ``-s``, ``-clamp on`` of a map | offset, tiling, wrap |
 
-Whatever else a material says is named among what is not carried, if it says anything: black ``Ka`` and ``Ks``, the usual
-``illum`` of 1 or 2, and options that have their default do not.
+Whatever else a material says is named among what is not carried, if it says anything. ``Ka`` does not (no light of today's
+renderers is ambient), nor do grey ``Ks``, a ``map_Ka`` that shows the picture of ``map_Kd``, the usual ``illum`` of 1 or 2, and
+options that have their default.
 
 Sources: Wavefront, "Advanced Visualizer" manual, appendix B1 (MTL); the PBR extension after Clara.io's documentation.
 """
@@ -31,11 +32,11 @@ NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2}  # options with up to so many nu
 WORDS = ("-blendu", "-blendv", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-bm", "-type", "-colorspace")
 ALIASES = {"bump": "map_bump", "map_tr": "map_d", "map_ns": "map_Ns"}
 KNOWN = {  # statements that are read
-    "kd", "d", "tr", "ke", "ns", "pm", "pr", "pc", "pcr", "ps", "aniso", "anisor", "ni",
+    "kd", "d", "tr", "ke", "ns", "pm", "pr", "pc", "pcr", "ps", "aniso", "anisor", "ni", "ka",
 }  # fmt: skip
 DEFAULT_IOR = Material().ior
 # other statements, and what they say then
-SAYS_NOTHING = {"ka": ("0",), "ks": ("0",), "tf": ("1",), "illum": ("1", "2"), "sharpness": ("60",)}
+SAYS_NOTHING = {"tf": ("1",), "illum": ("1", "2"), "sharpness": ("60",)}
 DEFAULTS = {
     "-mm": (0.0, 1.0), "-t": (0.0,), "-blendu": ("on",), "-blendv": ("on",), "-boost": (0.0,), "-cc": ("off",),
 }  # fmt: skip
@@ -96,9 +97,11 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
     shine = min(max(_number(statements.get("ns", ""), 0), 0), 1000)
     normal = maps.get("norm") or maps.get("map_bump")
     packed = _packed(maps.get("map_pr"), maps.get("map_pm"))
-    used = {"map_kd", "map_ke", "norm", "map_bump"}
+    used = {"map_kd", "map_ke", "norm" if "norm" in maps else "map_bump"}
     used |= ({"map_d"} if is_cut_out else set()) | ({"map_pr", "map_pm"} if packed else set())
-    pictures.left.add_all(f"material statement {key}" for key, one in maps.items() if key not in used and one.picture)
+    shown = maps["map_kd"].file if "map_kd" in maps else ""
+    lost = [key for key, one in maps.items() if key not in used and one.picture and (key, one.file) != ("map_ka", shown)]
+    pictures.left.add_all(f"material statement {key}" for key in lost)
     for key, one in maps.items():
         if key in used and one.picture:
             scaled = one is normal
@@ -125,6 +128,8 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
 
 def _says(key: str, rest: str) -> bool:
     """Whether a statement without a counterpart says anything."""
+    if key == "ks":
+        return len(set(_color(rest, 0.0))) > 1
     nothing = SAYS_NOTHING.get(key, ())
     words = [f"{_number(word, -1):g}" for word in rest.split()]
     return not words or any(word not in nothing for word in words)

@@ -62,8 +62,9 @@ class ObjLoader:
         animated: dict[str, Callable[[], FrameValues]] = {}
         if self._normals_of:
             animated["normal"] = partial(_normals, lines, corners, self._normals_of == "vertex", len(positions))
-        if self._has_colors:
-            animated["color"] = partial(_given, _colors(values, counts))
+        colors = _colors(values, counts)
+        if self._has_colors or colors is not None:  # what the first frame has not is named
+            animated["color"] = partial(_given, colors)
         return Mesh(positions, faces, animated=animated)
 
     def _load_first(self, path: Path, lines: Lines, positions: Float64, colors: Any) -> Mesh:
@@ -109,7 +110,11 @@ class ObjLoader:
 
 def _table(lines: Lines, keyword: bytes, index: Int64) -> Float32:
     """The entries of a kind, which corners refer to."""
-    table = columns(*lines.table(keyword), 2 if keyword == b"vt" else 3).astype(np.float32)
+    values, counts = lines.table(keyword)
+    if keyword == b"vt" and (counts == 1).any():  # v is 0 where it is not given
+        ends = np.cumsum(counts)
+        values, counts = np.insert(values, ends[counts == 1], 0.0), np.where(counts == 1, 2, counts)
+    table = columns(values, counts, 2 if keyword == b"vt" else 3).astype(np.float32)
     if (index < -1).any() or (index >= len(table)).any():
         raise ValueError(f"a face refers to a {keyword.decode()!r} entry outside 1..{len(table)}")
     return as_normals(table) if keyword == b"vn" else table
@@ -130,10 +135,20 @@ def _normals(lines: Lines, corners: Faces, by_vertex: bool, n_vertices: int) -> 
 
 
 def _colors(values: Float64, counts: Int64) -> Any:
-    """Colours ``(V, 4) uint8`` of lines x y z [w] r g b; None where lines have none."""
-    if (counts == counts[0]).all() and counts[0] in (6, 7):
-        return as_color(values.reshape(len(counts), -1)[:, -3:])
-    return None
+    """Colours ``(V, 4) uint8`` of lines x y z [w] r g b, white where a line has none; None where no line has any.
+
+    Seven numbers are x y z r g b a where the fourth is not always 1, as a weight is, and the last one is.
+    """
+    has_color = np.isin(counts, (6, 7))
+    if not has_color.any():
+        return None
+    ends = np.cumsum(counts)
+    seven = counts == 7
+    is_alpha = bool(seven.any()) and bool((values[ends[seven] - 4] != 1).any()) and bool((values[ends[seven] - 1] == 1).all())
+    colored = ends[has_color] - 3 - (is_alpha & seven[has_color])
+    rgba = np.full((len(counts), 4), 255, np.uint8)
+    rgba[has_color] = as_color(values[colored[:, None] + np.arange(3)])
+    return rgba
 
 
 def _given(colors: Any) -> FrameValues:

@@ -54,13 +54,15 @@ class OffLoader:
         positions = values[first[:, None] + np.arange(3)]
         face_lines = body[ends[n_vertices] : ends[n_vertices + n_faces]]
         flags = bool(header[1]), bool(header[2]), bool(header[3])
-        columns = _vertex_columns(values, counts, flags) if any(flags) else {}
+        columns = _vertex_columns(values, counts, flags)
         animated: dict[str, Callable[[], FrameValues]] = {
             name: partial(_given, columns, name) for name in ("normal", "color") if name in columns
         }
         if self._faces is not None and face_lines == self._face_lines and self._faces.max() < n_vertices:
             return Mesh(positions, self._faces, animated=animated)
-        faces, n_corners, colors = _parse_faces(face_lines, n_vertices)
+        faces, n_corners, colors, lost = _parse_faces(face_lines, n_vertices)
+        if not columns and (any(flags) or (counts > 3).any()):
+            lost = (*lost, "numbers of vertices behind their coordinates")
         if self._faces is not None:
             return Mesh(positions, faces, animated=animated)
         self._faces, self._face_lines = faces, face_lines
@@ -69,7 +71,7 @@ class OffLoader:
             attributes["uv"] = Attribute(columns["uv"], "vertex", "uv", name="uv")
         if colors is not None:
             attributes["face_color" if "color" in columns else "color"] = Attribute(colors, "triangle", "color")
-        return Mesh(positions, faces, attributes, polygons=as_polygons(n_corners), animated=animated)
+        return Mesh(positions, faces, attributes, polygons=as_polygons(n_corners), animated=animated, not_carried=lost)
 
 
 def _parse_rows(text: bytes) -> tuple[Float64, Int64, Int64]:
@@ -81,8 +83,11 @@ def _parse_rows(text: bytes) -> tuple[Float64, Int64, Int64]:
     return values, counts, np.cumsum(counts) - counts
 
 
-def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64, Array | None]:
-    """Polygons as triangles ``(T, 3)``, their numbers of corners, and the triangles' colours if all faces have some."""
+def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64, Array | None, tuple[str, ...]]:
+    """Polygons as triangles ``(T, 3)``, their numbers of corners, the triangles' colours if any has one, and what is lost.
+
+    A face without a colour is white beside others that have one.
+    """
     values, counts, first = _parse_rows(text)
     n_corners = values[first].astype(np.int64)
     if (n_corners >= counts).any():
@@ -92,16 +97,25 @@ def _parse_faces(text: bytes, n_vertices: int) -> tuple[Int32, Int64, Array | No
     at = np.repeat(first + 1 - (np.cumsum(n_corners) - n_corners), n_corners) + np.arange(n_corners.sum())
     faces = as_faces(values[at].astype(np.int64)[triangles], n_vertices)
     more = counts - n_corners - 1
-    if more[0] not in (3, 4) or (more != more[0]).any():  # one number is an index into a palette that the file lacks
-        return faces, n_corners, None
-    colors = values[(first + 1 + n_corners)[:, None] + np.arange(more[0])]
-    return faces, n_corners, np.repeat(as_color(colors), n_corners - 2, axis=0)
+    has_color = np.isin(more, (3, 4))
+    lost = ("colours of faces by a palette",) if (more == 1).any() else ()  # which the file lacks
+    if not has_color.any():
+        return faces, n_corners, None, lost
+    rgba = np.full((len(counts), 4), 255, np.uint8)
+    for width in (3, 4):
+        own = more == width
+        if own.any():
+            rgba[own] = as_color(values[(first[own] + 1 + n_corners[own])[:, None] + np.arange(width)])
+    return faces, n_corners, np.repeat(rgba, n_corners - 2, axis=0), lost
 
 
 def _vertex_columns(values: Float64, counts: Int64, flags: tuple[bool, bool, bool]) -> dict[str, Array]:
     """Normals, colours and texture coordinates of the vertices, as far as the header's flags and the rows' length agree."""
     has_uv, has_color, has_normal = flags
     n = int(counts[0])
+    has_color |= not any(flags) and n in (6, 7)  # some programs write colours without saying so
+    if not (has_uv or has_color or has_normal):
+        return {}
     width = n - 3 - 3 * has_normal - 2 * has_uv
     if (counts != n).any() or width < 0 or (has_color and width not in (3, 4)):
         return {}

@@ -66,7 +66,7 @@ class PlyLoader:
         if not face and elements.get("tristrips"):
             face, taken = _from_strips(elements["tristrips"]), {"vertex", "tristrips"}
         if not face:
-            raise ValueError("it has no element 'face'")
+            raise ValueError("it has no element 'face': points alone are no mesh")
         positions = _stack(vertex, tuple("xyz"))
         if positions is None:
             raise ValueError("its vertices lack x, y or z")
@@ -80,11 +80,12 @@ class PlyLoader:
         pictures = Pictures(path.parent)
         material = _material(read_comments(data), pictures)
         lists = [name for name, one in (*vertex.items(), *face.items()) if isinstance(one, Lists)]
-        lost = [name for name in lists if name not in (list_name, "texcoord")]
+        uv, unread = _uv(vertex, face, polygons.lengths, faces, len(positions))
+        lost = [f"list {name!r}" for name in lists if name not in (list_name, "texcoord")]
         return Mesh(
             positions,
             faces,
-            _uv(vertex, face, polygons.lengths, faces, len(positions)),
+            uv,
             tuple(pictures.notes),
             as_polygons(polygons.lengths),
             (Part("", (0, len(positions)), (0, len(faces)), 0),) if material else (),
@@ -92,7 +93,7 @@ class PlyLoader:
             tuple(pictures.images),
             animated=animated,
             metadata=Metadata(texts=_texts(data)),
-            not_carried=(*_left_behind(elements, taken), *(f"list {name!r}" for name in lost)),
+            not_carried=(*_left_behind(elements, taken), *lost, *unread),
         )
 
 
@@ -142,15 +143,24 @@ def _polygons(face: Columns) -> tuple[str, Lists]:
     return name, lists[name]
 
 
-def _uv(vertex: Columns, face: Columns, counts: Int64, faces: Int32, n_vertices: int) -> dict[str, Any]:
-    """Texture coordinates of the vertices, or a list (u, v, u, v ...) of each face."""
+def _uv(vertex: Columns, face: Columns, counts: Int64, faces: Int32, n_vertices: int) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Texture coordinates: a list (u, v, u, v ...) of each face, or of the vertices; and what is said of other sets.
+
+    A face whose list is empty has zeros.
+    """
+    pairs = {", ".join(pair): uv for pair in UV_NAMES if (uv := _stack(vertex, pair)) is not None}
     corners = face.get("texcoord")
-    if isinstance(corners, Lists) and np.array_equal(corners.lengths, 2 * counts):
-        rows = corners.values.reshape(-1, 2).astype(np.float32)[fan(counts).reshape(-1)]
-        values, indices = shared_by_vertex(rows, faces)
-        return {"uv": indexed(values, indices.astype(np.int64), faces, n_vertices, "uv")}
-    found = [uv for uv in (_stack(vertex, pair) for pair in UV_NAMES) if uv is not None]
-    return {"uv": Attribute(found[0], "vertex", "uv", name="uv")} if found else {}
+    if isinstance(corners, Lists) and len(corners.values) and np.isin(corners.lengths, (0, *np.unique(2 * counts))).all():
+        has_some = corners.lengths > 0
+        if np.array_equal(corners.lengths[has_some], 2 * counts[has_some]):
+            given = np.zeros((counts.sum(), 2), np.float32)
+            given[np.repeat(has_some, counts)] = corners.values.reshape(-1, 2)
+            values, indices = shared_by_vertex(given[fan(counts).reshape(-1)], faces)
+            return {"uv": indexed(values, indices.astype(np.int64), faces, n_vertices, "uv")}, tuple(pairs)
+    lost = ("list 'texcoord'",) if isinstance(corners, Lists) and len(corners.values) else ()
+    first = next(iter(pairs), "")
+    made = {"uv": Attribute(pairs[first], "vertex", "uv", name="uv")} if first else {}
+    return made, (*lost, *(name for name in pairs if name != first))
 
 
 def _animated(vertex: Columns, face: Columns, counts: Int64) -> Animated:

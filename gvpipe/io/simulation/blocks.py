@@ -8,6 +8,7 @@ Source: Kitware, VTK file formats, "XML file formats", section "Multiblock".
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,7 +18,7 @@ import numpy as np
 from gvpipe.foundation.arrays import Array
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.cells import Cells, join_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset, only_some
+from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, only_some
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 from gvpipe.io.simulation.xml_root import parse_xml
@@ -78,7 +79,9 @@ def load_multi_block(path: Path) -> Dataset:
     listed = list(_listed(inner, "", 0)) if inner is not None else []
     if len(listed) > MOST:
         raise ValueError(f"it has {len(listed)} blocks; at most {MOST} are read")
-    return join_blocks([(name, load_xml_grid(side_file(path, file, "block"))) for name, file in listed])
+    joined = join_blocks([(name, load_xml_grid(side_file(path, file, "block"))) for name, file in listed])
+    whole = tuple(field_data(each.get("Name") or "unnamed") for each in root.iterfind(".//FieldData/*"))
+    return replace(joined, not_carried=(*joined.not_carried, *whole))
 
 
 def _listed(element: ElementTree.Element, above: str, depth: int) -> Iterator[tuple[str, str]]:

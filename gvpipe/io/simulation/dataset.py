@@ -107,7 +107,7 @@ def only_some(name: str, parts: str) -> str:
 
 
 def plain_numbers(values: Array) -> Array:
-    """Integers of 64 bits as 32 where they fit, else as float32; other numbers in the machine's byte order."""
+    """Integers of 64 bits as 32 where they fit; numbers in the machine's byte order."""
     values = values.astype(values.dtype.newbyteorder("="), copy=False)
     if values.dtype.kind == "b":
         return values.astype(np.uint8)
@@ -116,7 +116,7 @@ def plain_numbers(values: Array) -> Array:
             return values.astype(np.float32, copy=False)
     if values.dtype.itemsize == 8:
         fits = values.size == 0 or (int(values.min()) >= -(1 << 31) and int(values.max()) < 1 << 31)
-        return values.astype(np.int32 if fits else np.float32)
+        return values.astype(np.int32) if fits else values
     return values
 
 

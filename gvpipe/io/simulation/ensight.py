@@ -89,7 +89,7 @@ class EnsightSteps:
             array = DataArray(partial(self._variable, variable, step, geometry))
             (point_data if variable.per_node else cell_data)[variable.name] = array
         blocks = tuple((part.name, sum(len(cells.types) for _, cells in part.groups)) for part in geometry.parts)
-        left = tuple(f"variable {name!r}" for name in self._case.skipped)
+        left = (*(f"variable {name}" for name in self._case.skipped), *dict.fromkeys(self._case.others))
         return Dataset(lambda: geometry.points, lambda: geometry.cells, point_data, cell_data, blocks, not_carried=left)
 
     def _open(self, series: Series, step: int, what: str, order: str = "") -> EnsightFile:

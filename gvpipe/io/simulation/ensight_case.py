@@ -58,6 +58,7 @@ class Case:
     variables: list[Variable] = field(default_factory=list)
     time_sets: dict[int, TimeSet] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
+    others: list[str] = field(default_factory=list)  # lines of the geometry and the materials that are not read
 
     def times(self) -> Float64 | None:
         """``(F,)`` of the steps: those of the set that the model or the first variable is in."""
@@ -123,10 +124,14 @@ def _case_line(section: str, text: str, case: Case) -> None:
             word for word in rest.split() if word.lower() not in ("change_coords_only", "cstep", "changing_geometry_per_part")
         ]
         case.model, _ = _series(words, has_name=False)
+    elif section == "GEOMETRY" or section == "MATERIAL":
+        case.others.append(f"{section.lower()} {key.strip()!r}"[:60])
     elif section == "VARIABLE":
         found = VARIABLE.fullmatch(text)
         if found is None:
-            case.skipped.append(text.partition(":")[0][:40])
+            words = rest.split()
+            named = next((word for word in words if not word.isdigit()), "")
+            case.skipped.append(f"{named} ({key.strip()})"[:60] if named else key.strip()[:60])
             return
         series, name = _series(found.group(3).split(), has_name=True)
         case.variables.append(Variable(name, COMPONENTS[found.group(1).lower()], found.group(2).lower() == "node", series))

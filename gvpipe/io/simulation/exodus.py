@@ -18,6 +18,7 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
 from gvpipe.io.damage import reading
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
@@ -79,10 +80,13 @@ class ExodusSteps:
         moving = [name for name, members in self._nodal.items() if name.lower().startswith("dis") and len(members) > 1]
         self._displacement = moving[0] if moving else None
         partial_names = [name for name, members in self._elemental.items() if not self._is_everywhere(members[0])]
-        self._left = (
-            *(f"{what} sets" for what, name in SETS.items() if file.has(name)),
-            *(f"global variable {name!r}" for name in _names(file, "name_glo_var")),
+        left = LeftBehind()
+        left.add_all(f"{what} sets" for what, name in SETS.items() if file.has(name))
+        left.add("global variables", len(_names(file, "name_glo_var")))
+        left.add_all(
+            f"attributes of {name or 'the block'}" for i, name in enumerate(self._blocks) if file.has(f"attrib{i + 1}")
         )
+        self._left = left.names
         self.notes: tuple[str, ...] = ()
         if moving:
             self.notes += (f"displacements {moving[0]!r} were added to positions",)
@@ -184,12 +188,14 @@ def _coordinates(file: NetCdf) -> Floats:
 
 
 def _block_names(file: NetCdf) -> list[str]:
-    n_blocks = 0
-    while file.has(f"connect{n_blocks + 1}"):
+    n_blocks = file.shape("eb_prop1")[0] if file.has("eb_prop1") and len(file.shape("eb_prop1")) == 1 else 0
+    while file.has(f"connect{n_blocks + 1}"):  # blocks without elements have no list of nodes
         n_blocks += 1
         if n_blocks > MAX_BLOCKS:
-            raise ValueError(f"it has more than {MAX_BLOCKS} blocks")
-    if not n_blocks:
+            break
+    if n_blocks > MAX_BLOCKS:
+        raise ValueError(f"it has more than {MAX_BLOCKS} blocks")
+    if not any(file.has(f"connect{number + 1}") for number in range(n_blocks)):
         raise ValueError("it has no element blocks; a mesh is needed")
     names = texts(file.read("eb_names")) if file.has("eb_names") else []
     ids = file.read("eb_prop1").tolist() if file.has("eb_prop1") else list(range(1, n_blocks + 1))
@@ -201,6 +207,8 @@ def _block_names(file: NetCdf) -> list[str]:
 
 def _block_cells(file: NetCdf, number: int) -> Cells:
     name = f"connect{number}"
+    if not file.has(name):
+        return Cells(np.zeros(0, np.uint8), np.zeros(1, np.int64), np.zeros(0, np.int64))
     kind = file.text(name, "elem_type").strip("\0 ").upper()
     if kind.startswith(("NSI", "NFA", "SUP")):
         raise ValueError(f"block {number} has elements {kind}, which are not read; convert them to hexahedra or tetrahedra")

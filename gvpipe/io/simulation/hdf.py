@@ -96,6 +96,11 @@ class HdfFile:
         check_bytes((stop - start, *found.shape[1:]), found.dtype.itemsize, self.size, repr(path))
         return np.asarray(found[start:stop])
 
+    def has_numbers(self, path: str) -> bool:
+        """Whether what lies at a path is no dataset of texts or of other things that are no numbers."""
+        found = self.find(path)
+        return not isinstance(found, self._h5py.Dataset) or found.dtype.kind in "iufb"
+
     def names(self, path: str) -> list[str]:
         """Names of the datasets in a group, in the file's order; none if there is no such group."""
         group = self.find(path)

@@ -32,6 +32,7 @@ TYPES = {
     "line3": 21, "triangle6": 22, "quad8": 23, "tetra10": 24, "hexahedron20": 25, "wedge15": 26, "pyramid13": 27, "quad9": 28,
     "hexahedron27": 29, "quad6": 30, "wedge12": 31, "wedge18": 32, "hexahedron24": 33, "triangle7": 34, "line4": 35,
 }  # fmt: skip
+BOOKKEEPING = ("gmsh:bounding_entities",)  # what meshio keeps to write a file again
 # what NumPy says of text behind the last number, as in Gmsh files with numbers per point: 2.4, and older versions' result
 UNMATCHED = "unmatched data", "cannot reshape array of size"
 
@@ -108,7 +109,8 @@ def _others(mesh: Any) -> tuple[str, ...]:
     """What else meshio finds: sets of points and cells, and data of the whole."""
     kinds = {"point_sets": "set of points", "cell_sets": "set of cells", "field_data": "field data"}
     found = {kind: getattr(mesh, kind, None) or {} for kind in kinds}
-    return tuple(f"{kinds[kind]} {str(name)!r}" for kind, names in found.items() for name in names)
+    named = [(kind, str(name)) for kind, names in found.items() for name in names]
+    return tuple(f"{kinds[kind]} {name!r}" for kind, name in named if name not in BOOKKEEPING)
 
 
 def _includes(text: bytes) -> bool:

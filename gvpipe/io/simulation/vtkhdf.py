@@ -6,6 +6,7 @@ Numbers of all steps stand one after the other; `Steps` says where each step sta
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.cells import Cells, join_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data
+from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
@@ -53,7 +54,9 @@ class BlockSteps:
     """The time steps of a file of several blocks, each a group of its own; raises `ValueError` for what it is not."""
 
     def __init__(self, file: HdfFile) -> None:
-        names = [name for name in file.names(ROOT) if file.attribute(f"{ROOT}/{name}", "Type") in KINDS]
+        kinds = {name: file.attribute(f"{ROOT}/{name}", "Type") for name in file.names(ROOT)}
+        names = [name for name, kind in kinds.items() if kind in KINDS]
+        self._left = tuple(f"block {name!r} of {kind}" for name, kind in kinds.items() if kind and kind not in KINDS)
         if not names:
             raise ValueError("it has no block of PolyData or UnstructuredGrid")
         if len(names) > MAX_BLOCKS:
@@ -68,7 +71,8 @@ class BlockSteps:
 
     def open(self, step: int) -> Dataset:
         """A step of all blocks; one that has no time steps is the same in all."""
-        return join_blocks([(name, each.open(min(step, each.n_steps - 1))) for name, each in self._blocks.items()])
+        joined = join_blocks([(name, each.open(min(step, each.n_steps - 1))) for name, each in self._blocks.items()])
+        return replace(joined, not_carried=(*joined.not_carried, *self._left))
 
 
 class VtkHdfSteps:
@@ -96,6 +100,10 @@ class VtkHdfSteps:
             raise ValueError(f"it has {self.n_steps} time steps; at most {MAX_STEPS} are read")
         self._points_of_part = self._sizes("NumberOfPoints")
         self._known: tuple[tuple[int, ...], Cells] | None = None
+        groups = [f"{root}/{group}" for group in ("PointData", "CellData")]
+        self._texts = [
+            text_array(name) for group in groups for name in file.names(group) if not file.has_numbers(f"{group}/{name}")
+        ]
 
     def open(self, step: int) -> Dataset:
         """A step; its numbers are read when they are called for."""
@@ -109,7 +117,7 @@ class VtkHdfSteps:
             lambda: cells,
             self._data("PointData", step, start, n_points),
             self._data("CellData", step, self._first_cell(step, first), len(cells.types)),
-            not_carried=tuple(field_data(name) for name in self._file.names(f"{self._root}/FieldData")),
+            not_carried=(*map(field_data, self._file.names(f"{self._root}/FieldData")), *self._texts),
         )
 
     def _sizes(self, name: str) -> Int64:
@@ -210,8 +218,10 @@ class VtkHdfSteps:
         roles = {self._file.attribute(f"{self._root}/{group}", role): kind for role, kind in ROLES.items()}
         made = {}
         for name in self._file.names(f"{self._root}/{group}"):
-            at = self._offset(f"{group}Offsets/{name}", step, start)
             path = f"{self._root}/{group}/{name}"
+            if not self._file.has_numbers(path):
+                continue
+            at = self._offset(f"{group}Offsets/{name}", step, start)
             unit = self._file.attribute(path, UNIT)[:LONGEST_UNIT]
             made[name] = DataArray(partial(self._rows, path, at, count), roles.get(name, ""), unit)
         return made

@@ -56,7 +56,7 @@ def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
 
 def _others(grids: list[ElementTree.Element]) -> list[str]:
     """What grids have beside a mesh and its numbers."""
-    found = [each for grid in grids for each in grid if each.tag in ("Set", "Information")]
+    found = [each for grid in grids for each in grid if each.tag == "Set"]
     return [f"{each.tag} {each.get('Name') or 'unnamed'!r}" for each in found]
 
 
@@ -71,14 +71,27 @@ class XdmfSteps:
         if temporal:
             columns = [collection.findall("Grid") for collection in temporal]
             self._steps = [list(grids) for grids in zip(*[c for c in columns if len(c) == len(columns[0])], strict=True)]
+            taken = [each for each, c in zip(temporal, columns, strict=True) if len(c) == len(columns[0])]
             self.times: Float64 | None = self._times(temporal[0], [grids[0] for grids in self._steps])
         else:
             found = [grid for grid in root.findall("Domain/Grid") if grid.get("GridType", "Uniform") == "Uniform"]
             self._steps = [[found[0]]] if found else []
-            self.times = None
+            self.times, taken = None, found[:1]
         if not self._steps:
             raise ValueError("it has no grid; a mesh is needed")
         self.n_steps = len(self._steps)
+        within = {id(each) for grid in taken for each in grid.iter("Grid")}
+        others = [grid for grid in root.iter("Grid") if id(grid) not in within and grid.findall("Attribute")]
+        self._left = [
+            f"numbers {each.get('Name') or 'unnamed'!r} of another grid"
+            for grid in others
+            for each in grid.findall("Attribute")
+        ]
+        self._left += [
+            f"grid {grid.get('Name') or 'unnamed'!r}"
+            for grid in root.findall("Domain/Grid")
+            if not temporal and grid not in taken
+        ]
         self._known: tuple[str, Cells] | None = None
 
     def open(self, step: int) -> Dataset:
@@ -103,7 +116,7 @@ class XdmfSteps:
                 (point_data if center == "node" else cell_data)[name] = DataArray(partial(self._numbers, attribute))
             else:
                 left.append(name)
-        lost = (*(f"numbers {name!r} of neither nodes nor cells" for name in left), *_others(grids))
+        lost = (*(f"numbers {name!r} of neither nodes nor cells" for name in left), *_others(grids), *dict.fromkeys(self._left))
         return Dataset(partial(self._points, geometry), lambda: cells, point_data, cell_data, not_carried=lost)
 
     def _part(self, grid: ElementTree.Element, tag: str) -> ElementTree.Element:

@@ -107,7 +107,7 @@ def _open_piece(file: VtkXml, piece: ElementTree.Element) -> Dataset:
     point_data, skipped = _arrays(file, piece.find("PointData"), n_points)
     cell_data, more = _arrays(file, piece.find("CellData"), n_cells)
     left = LeftBehind()
-    left.add_all(text_array(name) for name in (*skipped, *more))
+    left.add_all((*skipped, *more))
     left.add_all(field_data(each.get("Name") or "unnamed") for each in file.root.findall(f"{kind}/FieldData/*"))
     return Dataset(points, cells, point_data, cell_data, not_carried=left.names)
 
@@ -120,7 +120,7 @@ def _count(piece: ElementTree.Element, name: str) -> int:
 
 
 def _arrays(file: VtkXml, group: ElementTree.Element | None, n_rows: int) -> tuple[dict[str, DataArray], list[str]]:
-    """Named arrays of a group, and the names of those without numbers."""
+    """Named arrays of a group, and what is said of those without numbers."""
     if group is None:
         return {}, []
     roles = {group.get(role): kind for role, kind in ROLES.items() if group.get(role)}
@@ -131,7 +131,8 @@ def _arrays(file: VtkXml, group: ElementTree.Element | None, n_rows: int) -> tup
         if element.tag == "DataArray" and element.get("type") in TYPES:
             made[name] = DataArray(partial(read_array, file, element, n_rows), roles.get(name, ""))
         else:
-            skipped.append(name)
+            kind = element.get("type") or ""
+            skipped.append(text_array(name) if kind == "String" else f"array {name!r} of {kind or 'no type'}")
     return made, skipped
 
 

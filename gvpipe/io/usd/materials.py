@@ -1,7 +1,7 @@
 """UsdPreviewSurface materials as gvpipe's, and the textures that they show.
 
 Source: Pixar, UsdPreviewSurface specification, version 2.6. Its specular workflow and displacement have no place in glTF's
-metallic-roughness model and are left out.
+metallic-roughness model; they are named as what is not carried.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.asset.material import Image, Material, Texture
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.usd.names import name_of
 from gvpipe.io.usd.textures import CHANNELS, Textures
 
+TEXTURE = "UsdUVTexture"
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp", "useMetadata": "repeat"}
 
 
@@ -28,6 +30,7 @@ class Materials:
         self.textures = Textures(path)
         self.materials: list[Material] = []
         self.plain: list[str] = []  # materials without UsdPreviewSurface
+        self.left = LeftBehind()
         self._numbers: dict[tuple[str, bool], int] = {}
         self._uv_names: dict[int, dict[str, str]] = {}
 
@@ -116,13 +119,24 @@ class Materials:
                 f"material {name}: the texture of opacity is not the alpha of its colour; it was left out"
             )
         if _value(surface, "useSpecularWorkflow"):
-            self.textures.notes.append(f"material {name} has a specular colour, which was left out")
+            self.left.add("specular colour of a material")
+        if _value(surface, "displacement") or _connected(surface, "displacement")[0] is not None:
+            self.left.add("displacement of a material")
+        for given in surface.GetInputs():
+            shader, _ = _connected(surface, given.GetBaseName())
+            kind = "" if shader is None else str(shader.GetIdAttr().Get())
+            if kind == TEXTURE and given.GetBaseName() != "normal" and any(_value(shader, "bias") or ()):
+                self.left.add(f"bias of the texture of {given.GetBaseName()}")
+            elif kind and kind != TEXTURE and not _shows_colors(surface, given.GetBaseName()):
+                self.left.add(f"{kind} of {given.GetBaseName()}")
 
     def _color(self, surface: Any, name: str, fallback: tuple[float, float, float]) -> tuple[tuple[float, float, float], Any]:
         """A colour, or the texture in its place and what that is multiplied with."""
         source = self._source(surface, name)
         if source is not None:
             return source.scale[:3], source
+        if _shows_colors(surface, name):
+            return (1.0, 1.0, 1.0), None  # the mesh's own colours
         value = _value(surface, name)
         made = tuple(float(x) for x in value)[:3] if value is not None else fallback
         return (made if len(made) == 3 and all(math.isfinite(x) for x in made) else fallback), None
@@ -145,13 +159,20 @@ class Materials:
     def _source(self, surface: Any, name: str) -> Any:
         """The texture that an input is connected to, or None."""
         shader, output = _connected(surface, name)
-        if shader is None or shader.GetIdAttr().Get() != "UsdUVTexture":
+        if shader is None or shader.GetIdAttr().Get() != TEXTURE:
             return None
         place = _place(shader)
         wrap = tuple(WRAPS.get(str(_value(shader, axis)), "repeat") for axis in ("wrapS", "wrapT"))
         scale = _value(shader, "scale")
         factors = tuple(float(x) for x in scale) if scale is not None else (1.0, 1.0, 1.0, 1.0)
         return self.textures.read(_value(shader, "file"), output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
+
+
+def _shows_colors(surface: Any, name: str) -> bool:
+    """Whether a base colour is the mesh's own, which is carried."""
+    shader, _ = _connected(surface, name)
+    kind = "" if shader is None else str(shader.GetIdAttr().Get())
+    return name == "diffuseColor" and kind.startswith("UsdPrimvarReader") and _value(shader, "varname") == "displayColor"
 
 
 def _place(shader: Any) -> Texture:

@@ -20,7 +20,8 @@ HIDDEN_PURPOSES = ("guide", "proxy")
 TAKEN = {  # types of prims that are read, or that only hold others
     "Xform", "Scope", "Material", "Shader", "NodeGraph", "GeomSubset", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape",
 }  # fmt: skip
-MOTION = "velocities", "accelerations"
+MOTION = "velocities", "accelerations", "angularVelocities"
+NAMES = "userProperties:blender:object_name", "userProperties:blender:data_name"  # of prims, written again
 MATERIALS = "materialBind"  # the family of subsets that are read
 
 
@@ -51,9 +52,12 @@ def find_meshes(stage: Any) -> Found:
     left = LeftBehind()
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()))
     for prim in prims:
-        left.add_all(f"other variants of set {name}" for name in prim.GetVariantSets().GetNames())
+        sets = prim.GetVariantSets()
+        several = [name for name in sets.GetNames() if len(sets.GetVariantSet(name).GetVariantNames()) > 1]
+        left.add_all(f"other variants of set {name}" for name in several)
         left.add_all(_animated_inputs(prim))
-        left.add_all(f"attribute {each.GetName()}" for each in prim.GetAuthoredAttributes() if each.IsCustom())
+        custom = [str(each.GetName()) for each in prim.GetAuthoredAttributes() if each.IsCustom()]
+        left.add_all(f"attribute {name}" for name in custom if name not in NAMES)
         if prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()  # what lies below is shown where its points are
             found, others = find_instances(prim, stage.GetStartTimeCode())
@@ -92,9 +96,9 @@ def _animated_inputs(prim: Any) -> list[str]:
     """What of a shader changes over time: materials stand still here."""
     from pxr import UsdShade
 
-    if not prim.IsA(UsdShade.Shader):
+    if not (prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph)):  # materials are node graphs
         return []
-    inputs = UsdShade.Shader(prim).GetInputs()
+    inputs = UsdShade.ConnectableAPI(prim).GetInputs()
     return [f"animation of {each.GetBaseName()}" for each in inputs if each.GetAttr().ValueMightBeTimeVarying()]
 
 
@@ -102,7 +106,7 @@ def _left_of(mesh: Any) -> list[str]:
     """What a mesh has beside points, polygons and primvars that are read."""
     from pxr import UsdGeom
 
-    left = [name for name in MOTION if mesh.GetPrim().GetAttribute(name).HasAuthoredValue()]
+    left = [name for name in (*MOTION, "holeIndices") if mesh.GetPrim().GetAttribute(name).HasAuthoredValue()]
     families = {UsdGeom.Subset(each).GetFamilyNameAttr().Get() or "" for each in UsdGeom.Subset.GetAllGeomSubsets(mesh)}
     left += [f"subsets of family {name!r}" for name in sorted(families - {MATERIALS})]
     primvars = UsdGeom.PrimvarsAPI(mesh.GetPrim()).FindPrimvarsWithInheritance()
@@ -110,10 +114,11 @@ def _left_of(mesh: Any) -> list[str]:
 
 
 def _own_primvars(prim: Any) -> list[str]:
-    """Primvars of an instancer: a value for each instance."""
+    """Primvars of an instancer, a value for each instance, and their velocities."""
     from pxr import UsdGeom
 
-    return [f"primvar {each.GetPrimvarName()}" for each in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()]
+    motion = [name for name in MOTION if prim.GetAttribute(name).HasAuthoredValue()]
+    return motion + [f"primvar {each.GetPrimvarName()}" for each in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()]
 
 
 def _is_never_visible(prim: Any, stage: Any) -> bool:

@@ -65,9 +65,27 @@ def layers_of(
 def is_passed_over(primvar: Any) -> bool:
     """Whether a primvar is no number of the surface: a setting of programs, one for the whole mesh, or a text."""
     name = primvar.GetPrimvarName()
+    if name == "displayOpacity":
+        return not _has_place(primvar)
     if name.startswith("skel:") or name in OWN:
         return False
     return primvar.GetInterpolation() == "constant" or _kind(primvar) is None
+
+
+def _has_place(opacity: Any) -> bool:
+    """Whether opacities become the fourth number of colours: of static ones with as many rows."""
+    from pxr import UsdGeom
+
+    color = UsdGeom.PrimvarsAPI(opacity.GetAttr().GetPrim()).FindPrimvarWithInheritance("displayColor")
+    if not color or not color.HasValue():
+        return _is_opaque(opacity)
+    is_still = not color.ValueMightBeTimeVarying() or color.GetInterpolation() not in ("vertex", "varying", "uniform")
+    fits = opacity.GetInterpolation() in (color.GetInterpolation(), "constant")
+    return (is_still and fits) or _is_opaque(opacity)
+
+
+def _is_opaque(opacity: Any) -> bool:
+    return bool((np.array(opacity.Get() or 1.0) == 1).all())
 
 
 def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:

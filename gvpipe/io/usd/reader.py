@@ -105,7 +105,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
         materials=drawn,
         images=images,
         metadata=_metadata(stage, path, float(times[0])),
-        not_carried=found.left.names,
+        not_carried=(*found.left.names, *materials.left.names),
     )
     return sequence, any(_has_moving_normals(motion.prim) for motion in motions)
 

@@ -179,3 +179,24 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
     Abc.OStringProperty(schema.getArbGeomParams(), "tag").setValue("x")
     del archive, mesh, schema
     assert io.read(tmp_path / "a.abc").not_carried == ("parameter tag", "user property mass", "velocities")
+
+
+def test_texture_coordinates_that_change_are_named(tmp_path: Path) -> None:
+    import imath
+    from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+
+    archive = Abc.OArchive(str(tmp_path / "a.abc"))
+    mesh = AbcGeom.OPolyMesh(archive.getTop(), "m")
+    schema = mesh.getSchema()
+    schema.setTimeSampling(AbcCoreAbstract.TimeSampling(0.1, 0.0))
+    for shift in (0.0, 0.5):
+        points, indices, counts, uv = imath.V3fArray(3), imath.IntArray(3), imath.IntArray(1), imath.V2fArray(3)
+        np.asarray(points)[...] = TRIANGLE
+        np.asarray(indices)[...] = [0, 2, 1]
+        np.asarray(counts)[...] = 3
+        np.asarray(uv)[...] = np.array(TRIANGLE)[:, :2] + shift
+        sample = AbcGeom.OPolyMeshSchemaSample(points, indices, counts)
+        sample.setUVs(AbcGeom.OV2fGeomParamSample(uv, AbcGeom.GeometryScope.kVertexScope))
+        schema.set(sample)
+    del archive, mesh, schema
+    assert io.read(tmp_path / "a.abc").not_carried == ("animation of parameter uv",)

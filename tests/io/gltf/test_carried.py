@@ -285,4 +285,31 @@ def test_extras_instances_and_meshes_that_no_scene_shows(tmp_path: Path) -> None
     tree["nodes"].append({"mesh": 0})
     tree["scenes"] = [{"nodes": [0]}, {"nodes": [0, 1]}]
     found = read(file, tmp_path)
-    assert found.not_carried == ("attribute _HEAT of instances", "extras", "meshes outside of the scene", "other scenes")
+    assert found.not_carried == ("attribute _HEAT of instances", "extras 'mass'", "meshes outside of the scene", "other scenes")
+
+
+def test_clips_of_cameras_are_not_the_mesh_s(tmp_path: Path) -> None:
+    file = square_file()
+    file.add("nodes", {"camera": 0})
+    file.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}]
+    file.tree["scenes"] = [{"nodes": [0, 1]}]
+    file.clip((1, "translation", [0, 1], [[0, 0, 0], [9, 0, 0]], "LINEAR"), name="cam")
+    still = read(file, tmp_path)
+    assert still.n_frames == 1 and still.not_carried == ("animation of nodes without a mesh", "cameras")
+    file.clip((0, "translation", [0, 1], [[0, 0, 0], [9, 0, 0]], "LINEAR"), name="walk")
+    moving = read(file, tmp_path)
+    assert moving.metadata.texts["clip"] == "walk" and moving.read(30, 31)[0, 0, 0] == 9
+
+
+def test_matrices_of_vertices_are_named(tmp_path: Path) -> None:
+    file = square_file()
+    file.tree["meshes"][0]["primitives"][0]["attributes"]["_M"] = file.floats(np.zeros((4, 16)))
+    assert read(file, tmp_path).not_carried == ("vertex attribute _M",)
+
+
+def test_one_light_is_one(tmp_path: Path) -> None:
+    file = square_file()
+    lights = "KHR_lights_punctual"
+    file.tree["extensions"] = {lights: {"lights": [{"type": "point"}]}}
+    file.tree["nodes"][0]["extensions"] = {lights: {"light": 0}}
+    assert read(file, tmp_path).not_carried == (f"extension {lights}",)

@@ -102,3 +102,55 @@ def test_numbers_that_have_no_place(tmp_path: Path) -> None:
         "subsets of family 'outfit'",
         "velocities",
     )
+
+
+READER = """def Material "mat" {
+    token outputs:surface.connect = </mat/s.outputs:surface>
+    color3f inputs:tint.timeSamples = { 0: (1, 0, 0), 1: (0, 0, 1) }
+    def Shader "s" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </mat/r.outputs:result>
+        float inputs:displacement = 0.5
+        float inputs:roughness.connect = </mat/n.outputs:out>
+        token outputs:surface
+    }
+    def Shader "r" {
+        uniform token info:id = "UsdPrimvarReader_float3"
+        string inputs:varname = "displayColor"
+        float3 outputs:result
+    }
+    def Shader "n" {
+        uniform token info:id = "ND_noise2d_float"
+        float outputs:out
+    }
+}
+"""
+
+
+def test_what_shaders_say(tmp_path: Path) -> None:
+    more = "rel material:binding = </mat>\n color3f[] primvars:displayColor = [(1, 0, 0)]\n int[] holeIndices = [0]"
+    found = _read(tmp_path, READER + TRIANGLE.format(name="m", more=more))
+    assert found.materials[0].base_color[:3] == (1, 1, 1)  # the mesh's colours are its own
+    assert set(found.not_carried) == {
+        "animation of tint", "displacement of a material", "ND_noise2d_float of roughness", "holeIndices",
+    }  # fmt: skip
+
+
+def test_opacities_without_a_place(tmp_path: Path) -> None:
+    opacity = 'float[] primvars:displayOpacity = [0.5, 0.25, 1] (interpolation = "vertex")'
+    assert _read(tmp_path, TRIANGLE.format(name="m", more=opacity)).not_carried == ("primvar displayOpacity",)
+    color = 'color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0), (0, 0, 1)] (interpolation = "vertex")\n'
+    assert _read(tmp_path, TRIANGLE.format(name="m", more=color + opacity)).not_carried == ()
+
+
+def test_one_variant_and_names_written_again(tmp_path: Path) -> None:
+    text = """def Xform "w" (
+    variants = { string look = "red" }
+    prepend variantSets = "look"
+)
+{
+    variantSet "look" = { "red" { } }
+%s}
+"""
+    more = 'custom string userProperties:blender:object_name = "m"'
+    assert _read(tmp_path, text % TRIANGLE.format(name="m", more=more)).not_carried == ()
