@@ -107,37 +107,38 @@ def motion_features(sequence: MeshSequence, base: Float64, ring: sparse.csr_arra
 
 
 class LocalAffineFit:
-    """Equation 1 for neighbourhoods ``ring (R, P)``: their normal matrices are inverted once, then serve every frame."""
+    """Equation 1 for neighbourhoods ``ring (R, P)`` of points at ``base (P, 3)``; their normal matrices are inverted once.
+
+    Points are row vectors: ``x_i = x_0 + x_0 @ linear + translation``. ``linear`` is the linear part less identity, so that the
+    ridge pulls towards "unchanged" and not towards zero size.
+    """
 
     def __init__(self, base: Float64, ring: sparse.csr_array) -> None:
-        self._ring = ring
-        self._size = np.asarray(ring.sum(axis=1)).ravel()  # (P,)
-        self._base = base
-        self._mean = (ring @ base) / self._size[:, None]
+        self._base, self._ring = base, ring
+        self._size = np.asarray(ring.sum(axis=1)).ravel()[:, None]  # (R, 1)
+        self._mean = (ring @ base) / self._size
         outer = (base[:, :, None] * base[:, None, :]).reshape(-1, 9)
-        spread = (ring @ outer).reshape(-1, 3, 3) - self._size[:, None, None] * (
-            self._mean[:, :, None] * self._mean[:, None, :]
-        )
+        means = self._mean[:, :, None] * self._mean[:, None, :]
+        spread = (ring @ outer).reshape(-1, 3, 3) - self._size[:, :, None] * means
         ridge = RIDGE * np.trace(spread, axis1=1, axis2=2) + 1e-12
         self._inverse = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3))
 
     def motion(self, frames: Float64) -> Float64:
-        """Return ``(R, n, 4, 3)`` for ``frames (n, P, 3)``: rows 0..2 the linear part less identity, row 3 the translation.
+        """Return ``(R, n, 4, 3)`` for ``frames (n, P, 3)``: rows 0..2 the linear part less identity, row 3 the translation."""
+        shifts = np.moveaxis(frames - self._base, 0, 1)  # (P, n, 3)
+        rows = self.rows(shifts.reshape(len(shifts), -1))
+        return np.moveaxis(rows.reshape(len(rows), 4, *shifts.shape[1:]), 1, 2)
 
-        Points are row vectors: ``x_i = x_0 + x_0 @ motion[:3] + motion[3]``.
-        """
-        moved = np.moveaxis(frames, 0, 1)  # (n, P, 3) -> (P, n, 3)
-        n_points, n = moved.shape[:2]
-        mean = (self._ring @ moved.reshape(n_points, -1)).reshape(-1, n, 3) / self._size[:, None, None]
-        # displacement from the base, so that the ridge pulls towards "unchanged", not towards zero size
-        shift = moved - self._base[:, None, :]
-        products = (self._base[:, None, :, None] * shift[:, :, None, :]).reshape(n_points, -1)  # (P, n 3 3)
-        cross = (self._ring @ products).reshape(-1, n, 3, 3)
-        mean_shift = mean - self._mean[:, None, :]
-        cross -= self._size[:, None, None, None] * (self._mean[:, None, :, None] * mean_shift[:, :, None, :])
-        linear = np.einsum("pij,pnjk->pnik", self._inverse, cross)
-        translation = mean_shift - np.einsum("pi,pnik->pnk", self._mean, linear)
-        return np.concatenate([linear, translation[:, :, None, :]], axis=2)
+    def rows(self, shifts: Float64) -> Float64:
+        """Return ``(R, 4, m)`` for displacements ``(P, m)`` in any coordinates: the linear part, and the translation."""
+        shift = (self._ring @ shifts) / self._size
+        rows = np.empty((len(self._mean), 4, shifts.shape[1]))
+        linear = rows[:, :3]
+        for i in range(3):
+            linear[:, i] = self._ring @ (self._base[:, i, None] * shifts) - self._size * self._mean[:, i, None] * shift
+        linear[:] = self._inverse @ linear
+        rows[:, 3] = shift - np.einsum("pi,pim->pm", self._mean, linear)
+        return rows
 
 
 def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Float64:
@@ -168,19 +169,7 @@ def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: 
     """Motion vectors ``(n, 4m)`` of some ``points (n,)``: linear part and translation."""
     ring = ring[points]
     near = np.unique(ring.indices)
-    ring, unit, moved = ring[:, near], unit[near], moved[near]
-    size = np.asarray(ring.sum(axis=1)).ravel()[:, None]
-    mean, shift = (ring @ unit) / size, (ring @ moved) / size
-    outer = (unit[:, :, None] * unit[:, None, :]).reshape(-1, 9)
-    spread = (ring @ outer).reshape(-1, 3, 3) - size[:, :, None] * (mean[:, :, None] * mean[:, None, :])
-    ridge = RIDGE * np.trace(spread, axis1=1, axis2=2) + 1e-12
-    rows = np.empty((len(points), 4, moved.shape[1]))
-    linear = rows[:, :3]
-    for i in range(3):
-        linear[:, i] = ring @ (unit[:, i, None] * moved) - size * mean[:, i, None] * shift
-    linear[:] = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3)) @ linear
-    rows[:, 3] = shift - np.einsum("pi,pim->pm", mean, linear)
-    return rows.reshape(len(points), -1)
+    return LocalAffineFit(unit[near], ring[:, near]).rows(moved[near]).reshape(len(points), -1)
 
 
 def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, clusters: Int32) -> Int32:
