@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from folders import SAMPLES
+from folders import DOCS, SAMPLES
 
 import gvpipe
 from gvpipe.mesh.topology import adjacency, components, unique_edges
@@ -78,3 +78,10 @@ def test_body_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert {tuple(sorted(face)) for face in decoded.faces.tolist()} == {tuple(sorted(face)) for face in faces.tolist()}
     posed = names["pose"](np.array([[0.0, 0.0]]), template)
     assert np.abs(decoded[0] - posed[0]).max() < 2e-3
+
+
+def test_the_site_s_video_shows_the_sample() -> None:
+    """It is of today's format, and as `gvpipe encode samples/creature.npz docs/creature.mp4` writes it."""
+    source, video = gvpipe.read(SAMPLES / "creature.npz"), gvpipe.open(DOCS / "creature.mp4")
+    assert (video.n_frames, video.n_vertices) == (source.n_frames, source.n_vertices)
+    assert np.abs(video[0] - source[0]).max() < 0.01

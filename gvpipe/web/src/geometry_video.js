@@ -72,7 +72,7 @@ export class GeometryVideo {
       video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
-      if (parts?.isGrowing) video.#follow(parts);
+      if (parts?.isGrowing) video.#watch(parts);
       return video;
     } catch (error) {
       pictures?.close();
@@ -100,6 +100,7 @@ export class GeometryVideo {
   #beside = null; // a promise of pictures of their own, for fields that follow from positions
   #queueBeside = Promise.resolve();
   #wake = () => {}; // ends a wait for the next look
+  #followers = new Set(); // of a file that is still written
 
   /** The frame that is shown first: 0; of a file that is still written, that where its latest clip begins. */
   startFrame = 0;
@@ -107,6 +108,16 @@ export class GeometryVideo {
   grown = () => {};
   /** Called when it cannot be followed any longer, with the error. */
   lost = () => {};
+
+  /**
+   * Hear of both, beside those two functions.
+   *
+   * @param {{grown: () => void, lost: (error: Error) => void}} follower @returns {() => void} what ends it
+   */
+  follow(follower) {
+    this.#followers.add(follower);
+    return () => this.#followers.delete(follower);
+  }
 
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
@@ -243,7 +254,7 @@ export class GeometryVideo {
   }
 
   /** Look for frames that come, until the end is there: a few times per clip, and seldom while nothing comes. */
-  async #follow(file) {
+  async #watch(file) {
     const soonest = Math.min(Math.max(SOONEST, (1000 * file.live.clip) / this.fps / LOOKS_PER_CLIP), LATEST);
     let [since, answered, tries, outages] = [performance.now(), performance.now(), 0, 0];
     while (this.isLive && !this.#isClosed) {
@@ -264,7 +275,7 @@ export class GeometryVideo {
         const isRefusal = error.status < OUTAGE;
         outages = error.kind !== "load" || isRefusal ? 0 : outages + 1;
         if (isRefusal ? tries < TRIES : outages && performance.now() - answered < PATIENCE) continue;
-        this.lost(error);
+        for (const each of [this, ...this.#followers]) each.lost(error);
         return;
       }
     }
@@ -278,7 +289,7 @@ export class GeometryVideo {
     this.frameCount = live.frames;
     this.byteLength = size;
     this.#pictures.grow();
-    this.grown();
+    for (const each of [this, ...this.#followers]) each.grown();
   }
 
   #takeLevel(reader, pictures, asset) {

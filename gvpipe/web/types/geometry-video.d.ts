@@ -179,6 +179,8 @@ export class GeometryVideo {
   grown: () => void;
   /** Called when it cannot be followed any longer. */
   lost: (error: Error) => void;
+  /** Hear of both, beside those two functions; returns what ends it. */
+  follow(follower: { grown: () => void; lost: (error: Error) => void }): () => void;
   /** Seconds that play without a wait for the file: `[start, end]` of each stretch. */
   readonly buffered: [number, number][];
   /** Bits per second. */

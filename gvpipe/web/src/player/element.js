@@ -18,6 +18,7 @@ import { Bar, nextSpeed } from "./bar.js";
 import { embedded } from "./embedded.js";
 import { actionOf } from "./keys.js";
 import { Legend } from "./legend.js";
+import { Load } from "./load.js";
 import { isFullscreen, save, toggleFullscreen } from "./outside.js";
 import { Panel } from "./panel.js";
 import { Stage, probeGpu } from "./stage.js";
@@ -50,9 +51,8 @@ export class GeometryVideoElement extends Base {
   #panel;
   #legend;
   #message;
-  #loading = 0; // counts loads, so that a late one does not replace its successor
+  #loading = null; // Load
   #loaded = null; // promise, while a file is loaded
-  #ending = null; // AbortController of what is loading
   #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
   #isReady = false; // whether a file is loaded, and said to be
   #giveUps = new Set(); // reject what waits for that to play
@@ -268,52 +268,47 @@ export class GeometryVideoElement extends Base {
     this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
     let end;
     this.#loaded = new Promise((resolve) => (end = resolve)); // there before any listener is told
-    const loaded = this.#load(source);
+    this.#loading = new Load();
+    const loaded = this.#load(source, this.#loading);
     end(loaded);
     return loaded;
   }
 
-  async #load(source) {
-    const loading = this.#loading;
-    const isLate = () => loading !== this.#loading; // another is asked for, or the element is gone
-    this.#say("Loading …");
-    this.#tell("loadstart");
-    if (isLate()) return undefined; // by a listener
-    const { signal } = (this.#ending = new AbortController());
-    let [loaded, video] = [null, null];
+  async #load(source, load) {
+    let loaded = null;
     try {
+      this.#say("Loading …");
+      this.#tell("loadstart");
+      load.check(); // a listener may have ended it, as by every event
       const file = typeof source === "string" && source[0] === "#" ? embedded(source) : source;
       const level = this.lod === "auto" ? "coarsest" : this.lod || "coarsest"; // shown at once
-      loaded = GeometryVideo.load(file, { level, signal });
+      loaded = GeometryVideo.load(file, { level, signal: load.signal });
       loaded.catch(() => {}); // looked at below
       await breathe();
       probeGpu(); // while a worker decodes
-      await breathe();
-      if (!isLate()) this.#stage ??= this.#openStage();
-      video = await loaded;
-      if (isLate()) return video.close();
-      await breathe();
-      if (isLate()) return video.close();
-      await this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y"));
-      if (isLate()) return video.close();
+      await load.step(breathe());
+      this.#stage ??= this.#openStage();
+      const video = await load.step(loaded);
+      await load.step(breathe());
+      await load.step(this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y")));
       if (video.level) this.#tell("levelchange", video.level);
-      await breathe();
-      if (isLate()) return video.close();
-      if (level === "coarsest" && video.level) await this.#stage.mesh.setLevel(0);
-      await breathe();
-      if (isLate()) return video.close();
+      await load.step(breathe());
+      if (level === "coarsest" && video.level) await load.step(this.#stage.mesh.setLevel(0));
+      await load.step(breathe());
+      this.video = video;
+      this.#say("");
+      this.#openMesh();
+      await load.step(breathe());
+      await load.step(this.#showField());
+      this.#becomeReady(load);
     } catch (error) {
       loaded?.then((late) => late.close(), () => {});
-      if (!isLate()) this.#fail(error);
-      return undefined;
+      if (!load.isOver) this.#fail(error);
     }
-    this.video = video;
-    this.#say("");
-    this.#openMesh();
-    await breathe();
-    if (isLate()) return undefined;
-    await this.#showField();
-    if (isLate()) return undefined;
+  }
+
+  /** Tell what is known and shown, and begin to play if that is wanted. */
+  #becomeReady(load) {
     this.#bar.setEnabled(true);
     this.#bar.setFrame(this.currentFrame);
     const states = [
@@ -324,7 +319,7 @@ export class GeometryVideoElement extends Base {
       this.readyState = state;
       for (const event of events) {
         this.#tell(event, event === "frame" ? this.currentFrame : null);
-        if (isLate()) return undefined; // by a listener
+        load.check();
       }
     }
     this.#isReady = true;
@@ -333,7 +328,6 @@ export class GeometryVideoElement extends Base {
     this.#startTime = 0;
     const plays = this.#wanted ?? (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches);
     if (plays) this.#mesh.play().catch(() => {}); // told by events
-    return undefined;
   }
 
   #openStage() {
@@ -537,12 +531,11 @@ export class GeometryVideoElement extends Base {
 
   #unload() {
     const wasLoaded = this.video !== null;
-    this.#loading++;
     if (this.#loaded) this.#wanted = this.#startFrame = null; // they were about the file before
     this.#isReady = false;
     this.#loaded = null;
-    this.#ending?.abort(new DOMException("another file was asked for", "AbortError"));
-    this.#ending = null;
+    this.#loading?.end();
+    this.#loading = null;
     this.#showing = null;
     this.video?.close();
     this.video = null;

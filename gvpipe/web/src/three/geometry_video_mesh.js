@@ -71,6 +71,7 @@ export class GeometryVideoMesh extends Mesh {
   #fieldRange = [0, 0];
   #drawn = this; // what the materials are of: the mesh, or points
   #wires = null;
+  #unfollow;
   #isDisposed = false;
 
   /** Made by `create`. */
@@ -89,8 +90,8 @@ export class GeometryVideoMesh extends Mesh {
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
     };
-    video.grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
-    video.lost = on.fail;
+    const grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
+    this.#unfollow = video.follow({ grown, lost: on.fail });
     this.#playback = new Playback(video, on, view.ownClock ? undefined : (tick) => (this.#tick = tick));
   }
 
@@ -228,6 +229,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#isDisposed = true;
     this.#wanted = { field: null };
     this.#playback.close();
+    this.#unfollow();
     this.#tick = null;
     this.#closeField();
     for (const material of [this.#materials, this.#wires?.material].flat()) material?.dispose();
