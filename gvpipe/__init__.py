@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.foundation.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report, Restreamed, decode, encode, open, render, restream
+    from gvpipe.api import Report, Restreamed, decode, encode, open, render, restream, skin
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from gvpipe.foundation.errors import GvpipeError
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.model.sequence import MeshSequence
+    from gvpipe.model.skin import Skin
     from gvpipe.playback.files import read, write
     from gvpipe.playback.live import LiveEncoder, open_live
     from gvpipe.playback.player import Player
@@ -54,6 +55,7 @@ __all__ = [
     "Renderer",
     "Report",
     "Restreamed",
+    "Skin",
     "Texture",
     "compare",
     "decode",
@@ -66,11 +68,12 @@ __all__ = [
     "read",
     "render",
     "restream",
+    "skin",
     "write",
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Report", "Restreamed", "decode", "encode", "open", "render", "restream"),
+    "gvpipe.api": ("Report", "Restreamed", "decode", "encode", "open", "render", "restream", "skin"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
@@ -85,6 +88,7 @@ _HOMES = {
     "gvpipe.rasterizer.camera": ("Camera",),
     "gvpipe.rasterizer.renderer": ("Renderer",),
     "gvpipe.model.sequence": ("MeshSequence",),
+    "gvpipe.model.skin": ("Skin",),
     "gvpipe.playback.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }

@@ -29,6 +29,7 @@ from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_fi
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import Skin
 from gvpipe.playback.files import Source, frame_range, read
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -290,6 +291,40 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
 def open(path: StrPath, *, unlimited: bool = False) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
     return Player(path, unlimited=unlimited)
+
+
+def skin(
+    source: MeshSequence | StrPath,
+    joints: int = 0,
+    *,
+    target_kg: float | None = None,
+    max_error: float | str | None = None,
+    progress: Progress | None = None,
+) -> Skin:
+    """Find a skeleton that moves a sequence: joints, weights, and the joints' transforms in every frame.
+
+    Args:
+        source: a sequence, or what `gvpipe.read` takes.
+        joints: how many, 1..1024; 0: as many as the error takes, 256 at most.
+        target_kg: Karni and Gotsman's error that it should not exceed, percent; 0.14 if no error is given.
+        max_error: largest distance of a vertex, as of `encode`.
+        progress: called with each stage and the part of it that is done.
+
+    Returns:
+        The skeleton; its ``error`` is the largest distance of a vertex, part of the first frame's diagonal. It may exceed what
+        was asked for, where no skeleton that was tried holds it.
+
+    Raises:
+        InputError: the source cannot be read.
+        SettingError: an argument out of range.
+    """
+    from gvpipe.playback.files import read
+    from gvpipe.skinning.fit import DEFAULT_KG, Wanted, fit_skin
+
+    sequence = source if isinstance(source, MeshSequence) else read(source)
+    bound = None if max_error is None else parse_bound(max_error, sequence)
+    wanted = Wanted(DEFAULT_KG if target_kg is None and bound is None else target_kg, bound)
+    return fit_skin(sequence, joints, wanted, progress)[0]
 
 
 def render(

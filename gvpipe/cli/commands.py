@@ -206,6 +206,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
+@click.option("--skin/--no-skin", default=None, help="Of a .glb: a skeleton, or morph targets. [default: what is exact]")
 @unlimited_option
 @output_options
 def decode(
@@ -218,6 +219,7 @@ def decode(
     parts: tuple[str, ...],
     lod: int,
     local: bool,
+    skin: bool | None,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -230,6 +232,7 @@ def decode(
     from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
     from gvpipe.cli.choices import chosen, chosen_frames
+    from gvpipe.cli.skeletons import skin_of_video
     from gvpipe.foundation import notes
     from gvpipe.playback import files
 
@@ -240,7 +243,8 @@ def decode(
         start, stop = files.frame_range(player, first, last)
         level = player.level(lod)
         sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
-        noticed = files.write(sequence.local() if local else sequence, path, start)
+        found, said = skin_of_video(player, path, (start, stop), skin, is_whole=not parts and not lod)
+        noticed = [*said, *files.write(sequence.local() if local else sequence, path, start, found)]
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
     noticed += [UNFINISHED] if player.bitstream.is_unfinished and UNFINISHED not in noticed else []
@@ -248,6 +252,7 @@ def decode(
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
+    values |= {"joints": found.joints if found else 0}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
     shape = notes.shape(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
+@click.option("--skin", is_flag=True, help="Find a skeleton, and write a .glb with it in place of morph targets.")
+@click.option("--joints", type=int, default=0, help="Of the skeleton. [default: as many as the error takes, 256 at most]")
+@click.option("--target-kg", type=float, help="Largest KG error of the skeleton, percent. [default: 0.14]")
+@click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
 @unlimited_option
 @output_options
 def convert(
@@ -46,6 +50,10 @@ def convert(
     parts: tuple[str, ...],
     lod: int,
     split: bool,
+    skin: bool,
+    joints: int,
+    target_kg: float | None,
+    max_error: str | None,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -55,11 +63,13 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
+    from gvpipe.cli.skeletons import check_skin_options, find_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
+    check_skin_options(target, skin and not split, joints or target_kg or max_error)
     if split:
         if lod or start is not None or stop is not None or target == PIPE:
             raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
@@ -80,11 +90,12 @@ def convert(
             start, stop = files.frame_range(whole, first, last)
             some = whole.part(start, stop)
         sequence = chosen(some, parts, None, "convert", progress)
-        noticed = [*some.notes, *files.write(sequence, path, start)]
+        found, said = find_skin(sequence, joints, target_kg, max_error, progress) if skin else (None, [])
+        noticed = [*some.notes, *said, *files.write(sequence, path, start, found)]
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
-    values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
+    values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "joints": found.joints if found else 0}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

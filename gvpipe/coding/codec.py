@@ -21,6 +21,7 @@ from gvpipe.foundation.arrays import Float32, Int32, Integers
 from gvpipe.foundation.errors import SettingError
 from gvpipe.foundation.progress import Progress, silent
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import Skin
 from gvpipe.runtime.blas import one_blas_thread
 
 Result = TypeVar("Result")
@@ -193,6 +194,11 @@ class Codec(Protocol):
         ...
 
     @classmethod
+    def skin(cls, bitstream: Bitstream) -> Skin | None:
+        """Return the skeleton that moves a bitstream's vertices, as far as it goes; None: it has none; raises `CorruptFile`."""
+        ...
+
+    @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """Return what each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         ...
@@ -250,6 +256,11 @@ class BaseCodec:
     def browser_obstacle(cls, bitstream: Bitstream) -> str:
         """What keeps browsers from playing its files; see `Codec.browser_obstacle`. Here: their player lacks the codec."""
         return bitstream.codec
+
+    @classmethod
+    def skin(cls, bitstream: Bitstream) -> Skin | None:
+        """The skeleton of its files; see `Codec.skin`. Here: none."""
+        return None
 
     @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+import numpy as np
+
 from gvpipe.coding.codec import Codec, Encoded, FrameReader, Memo, check_name
 from gvpipe.coding.corrections.bound import correct
 from gvpipe.coding.repeated_frames import RepeatedFramesReader, add_repeated_frames, find_repeated_frames, read_repeated_frames
@@ -21,6 +23,7 @@ from gvpipe.foundation.arguments import did_you_mean
 from gvpipe.foundation.errors import NewerVersion, SettingError, corrupt, quote
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import Skin
 
 GROUP = "gvpipe.codecs"
 FIELDS = "field."  # how names of their sections begin (`gvpipe.asset_coding`)
@@ -91,6 +94,21 @@ def browser_obstacle(bitstream: Bitstream) -> str:
         SettingError: no codec of that id is installed.
     """
     return str(codec_class(bitstream.codec).browser_obstacle(bitstream))
+
+
+def read_skin(bitstream: Bitstream) -> Skin | None:
+    """The skeleton that moves a file's vertices in all its frames, as far as it goes; None if it has none.
+
+    Raises:
+        CorruptFile: its sections are not what its codec writes.
+    """
+    codec = codec_class(bitstream.codec)
+    holds = read_repeated_frames(bitstream) if codec.holds else None
+    distinct = bitstream if holds is None else dataclasses.replace(bitstream, n_frames=holds.n_distinct)
+    skin: Skin | None = codec.skin(distinct)
+    if skin is None or holds is None:
+        return skin
+    return dataclasses.replace(skin, transforms=np.repeat(skin.transforms, holds.lengths, axis=0))
 
 
 def segment_parts(bitstream: Bitstream) -> SegmentParts:

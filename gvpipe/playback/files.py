@@ -17,6 +17,7 @@ from gvpipe.foundation.errors import InputError
 if TYPE_CHECKING:
     from gvpipe.io.runs import Run
     from gvpipe.model.sequence import MeshSequence
+    from gvpipe.model.skin import Skin
     from gvpipe.playback.player import Player
 
 Source = StrPath | Sequence[StrPath]
@@ -90,8 +91,11 @@ def read_runs(
     return find_runs(lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited), frames)
 
 
-def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
+def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | None = None) -> list[str]:
     """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
+
+    With a ``skin`` of it (`gvpipe.skin`, `Player.skin`), a ``.glb`` has its skeleton in place of morph targets, and the frames
+    are as the skeleton moves them.
 
     Returns notes: what the format cannot hold, a line each.
 
@@ -107,7 +111,7 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0) -> list[str]:
     check_path(path, "gvpipe.write's path")
     from gvpipe.io.writing import write as write_sequence
 
-    return list(write_sequence(sequence, path, start))
+    return list(write_sequence(sequence, path, start, skin))
 
 
 def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory, file_notes
 from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.coding.codec import GroupReader, LevelReader
-from gvpipe.coding.registry import codec_class, codec_ids, open_reader
+from gvpipe.coding.registry import codec_class, codec_ids, open_reader, read_skin
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes, read_file
 from gvpipe.container.outline import Outline
@@ -30,6 +30,7 @@ from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
+from gvpipe.model.skin import Skin
 from gvpipe.playback.frame_cache import FrameCache
 from gvpipe.playback.shared_reader import SharedReader
 
@@ -120,6 +121,17 @@ class Player:
     def directory(self) -> Directory:
         """Section ``asset`` of the file."""
         return self._asset.directory
+
+    def skin(self) -> Skin | None:
+        """The skeleton that moves the vertices, and how far it is from the frames; None: the file has none.
+
+        Files of codec `mcgv` have one, as a rule; where pictures say more, its error is that of the motion alone.
+        """
+        from gvpipe.skinning.fit import measured
+
+        with in_file(self.path):
+            skin = read_skin(self.bitstream)
+        return None if skin is None else measured(skin, self.sequence())
 
     def outline(self) -> Outline:
         """What `gvpipe.info` tells of the mesh, from what is decoded."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from asset_scene import scene
-from folders import DATA, ROOT
+from folders import DATA, GOLDEN, ROOT
 
 import gvpipe
 
@@ -71,3 +71,14 @@ def test_no_error_of_real_assets(tmp_path: Path, source: str) -> None:
     gvpipe.write(read.part(0, min(len(read), 6)), tmp_path / "a.glb")
     (report,) = reports(tmp_path / "a.glb")
     assert faults(report) == []
+
+
+def test_no_error_of_skeletons(tmp_path: Path) -> None:
+    """Of a scene with parts, materials and pictures, and of a video without pictures."""
+    source = scene()
+    gvpipe.write(source, tmp_path / "scene.glb", skin=gvpipe.skin(source))
+    with gvpipe.open(GOLDEN / "mcgv-1-rigid.mp4") as video:
+        gvpipe.write(video.sequence(), tmp_path / "video.glb", skin=video.skin())
+    found = reports(tmp_path / "scene.glb", tmp_path / "video.glb")
+    assert [faults(report) for report in found] == [[], []]
+    assert all(report["info"]["hasSkins"] for report in found)

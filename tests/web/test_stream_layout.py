@@ -179,7 +179,7 @@ def test_damage_is_one_clear_error(module: Callable[..., Any], site: tuple[Path,
         "configuration.mp4": ("corrupt", flipped(data, data.index(b"avcC") + 8)),
         "picture.mp4": ("corrupt", flipped(data, data.index(b"mdat") + 30)),
         "run.mp4": ("corrupt", flipped(data, data.index(b"trun") + 10)),
-        "newer.mp4": ("newer", data.replace(b"gvpipe 2 ", b"gvpipe 9 ")),
+        "newer.mp4": ("newer", data.replace(b"gvpipe 1 ", b"gvpipe 9 ")),
         "stripped.mp4": ("stripped", data.replace(data[index - 16 : index], bytes(16))),
     }
     for name, (_, content) in damaged.items():

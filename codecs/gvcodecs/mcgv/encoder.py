@@ -25,6 +25,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import SegmentParts
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import Skin
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,13 @@ class Mcgv(Settings):
     def browser_obstacle(cls, bitstream: Bitstream) -> str:
         """What keeps browsers from playing a bitstream of this codec; ``""`` if they play it."""
         return browser_obstacle(bitstream)
+
+    @classmethod
+    def skin(cls, bitstream: Bitstream) -> Skin | None:
+        """The clusters of a blended bitstream as joints; None for others; raises `CorruptFile`."""
+        from gvcodecs.mcgv.decoding.skin_reader import read_skin
+
+        return read_skin(bitstream)
 
     @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:

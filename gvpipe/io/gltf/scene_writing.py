@@ -85,7 +85,9 @@ def prepare(sequence: MeshSequence, fields: tuple[str, ...] = ()) -> Prepared:
     )
 
 
-def write_scene(glb: Glb, prepared: Prepared, positions: Float32, more: tuple[GltfAttribute, ...] = ()) -> list[Written]:
+def write_scene(
+    glb: Glb, prepared: Prepared, positions: Float32, more: tuple[GltfAttribute, ...] = (), is_skinned: bool = False
+) -> list[Written]:
     """Add the whole scene.
 
     Args:
@@ -93,6 +95,7 @@ def write_scene(glb: Glb, prepared: Prepared, positions: Float32, more: tuple[Gl
         prepared: what all frames share.
         positions: ``(W, 3)`` of the split vertices.
         more: attributes of this frame alone.
+        is_skinned: joints place the meshes, whose nodes are then roots.
     """
     sequence = prepared.sequence
     write_materials(glb, sequence.materials, sequence.images, prepared.uv_sets)
@@ -103,14 +106,14 @@ def write_scene(glb: Glb, prepared: Prepared, positions: Float32, more: tuple[Gl
         mesh = _write_mesh(glb, shape, positions, (*prepared.attributes, *more))
         node = glb.append("nodes", {"mesh": mesh} | ({"name": shape.name} if shape.name else {}))
         written.append(Written(node, mesh, shape))
-        if not shape.parent:
+        if is_skinned or not shape.parent:
             roots.append(node)
         elif shape.parent == last_parent:
             glb.tree["nodes"][roots[-1]]["children"].append(node)
         else:
             roots.append(glb.append("nodes", {"name": shape.parent, "children": [node]}))
         last_parent = shape.parent
-    for node in roots:
+    for node in () if is_skinned else roots:
         glb.tree["nodes"][node] |= prepared.place
     glb.append("scenes", {"nodes": roots})
     glb.tree["scene"] = 0
@@ -131,6 +134,15 @@ def _write_mesh(glb: Glb, shape: Shape, positions: Float32, attributes: tuple[Gl
         item: Json = {"attributes": accessors, "indices": glb.array(corners, INDICES)}
         primitives.append(item | ({} if material is None else {"material": material}))
     return glb.append("meshes", {"primitives": primitives} | ({"name": shape.name} if shape.name else {}))
+
+
+def normals_of(prepared: Prepared, number: int, positions: Float32) -> GltfAttribute | None:
+    """The normals of a frame ``(V, 3)`` by its number; None if the sequence has none that change."""
+    if prepared.normals is None:
+        return None
+    fields = prepared.sequence.fields
+    own = {"normal": fields["normal"].read(number, number + 1)[0]} if prepared.normals.is_field else {}
+    return prepared.normals.of(positions, own)
 
 
 def world_matrix(metadata: Metadata) -> Float64:

@@ -17,12 +17,11 @@ import numpy as np
 from gvpipe.foundation.arrays import Array, Float32
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError
-from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import VERTICES, Glb
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.normal_writing import NORMAL
-from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, prepare, write_scene
+from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, normals_of, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.model.sequence import MeshSequence
 
@@ -114,12 +113,12 @@ def _write_animation(glb: Glb, prepared: Prepared) -> int:
     """Add the scene and its animation; returns the largest number of morph targets of a mesh."""
     sequence, sources = prepared.sequence, prepared.split.sources
     first = sequence.read(0, 1)[0]
-    base, normals = first[sources], _normals(prepared, 0, first)
+    base, normals = first[sources], normals_of(prepared, 0, first)
     targets = [_Targets(one) for one in write_scene(glb, prepared, base, () if normals is None else (normals,))]
     for start, block in sequence.chunks():
         for i, frame in enumerate(block):
             deltas = {"POSITION": frame[sources] - base}
-            own = _normals(prepared, start + i, frame)
+            own = normals_of(prepared, start + i, frame)
             if normals is not None and own is not None:
                 turns = own.values - normals.values
                 turns[np.abs(turns).max(axis=1) < ROUNDING] = 0
@@ -134,15 +133,6 @@ def _write_animation(glb: Glb, prepared: Prepared) -> int:
         for primitive in mesh["primitives"]:
             primitive["targets"] = one.accessors
     return max((len(one.accessors) for one in moving), default=0)
-
-
-def _normals(prepared: Prepared, number: int, positions: Float32) -> GltfAttribute | None:
-    """The normals of a frame ``(V, 3)``; None if the sequence has none."""
-    if prepared.normals is None:
-        return None
-    fields = prepared.sequence.fields
-    own = {"normal": fields["normal"].read(number, number + 1)[0]} if prepared.normals.is_field else {}
-    return prepared.normals.of(positions, own)
 
 
 def _write_channels(glb: Glb, sequence: MeshSequence, moving: list[_Targets]) -> None:

@@ -1,0 +1,143 @@
+"""Sequences as GLB with a skeleton: the bind pose once, and keys of the joints.
+
+A joint's motion is affine. It is two nodes (`gvpipe.io.scene.affine_nodes`), so that it is exact in every engine that
+multiplies matrices down the tree. Inverse bind matrices are the identity. The meshes are roots, as glTF wants skinned ones; one
+node above all joints turns and scales the scene.
+
+Source: Khronos, glTF 2.0 specification, sections 3.7.3 (skins) and 3.11 (animations).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gvpipe.foundation.arrays import Array, Bool, Float32, UInt16
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError
+from gvpipe.io.gltf.attribute_writing import GltfAttribute
+from gvpipe.io.gltf.clips import FPS
+from gvpipe.io.gltf.glb import Glb
+from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
+from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import Skin
+
+FULL = 65535  # a weight of 1
+MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
+STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
+NO_PARENTS = ("skinned meshes have no nodes above them; names of the parts' parents are left out",)
+
+
+def write_skinned(sequence: MeshSequence, skin: Skin, path: Path) -> tuple[str, ...]:
+    """Write a sequence as the skin moves it; return what the file cannot hold, a line each.
+
+    Args:
+        sequence: its triangles, attributes, parts and materials.
+        skin: of its vertices, and of as many frames.
+        path: of the ``.glb``.
+
+    Raises:
+        InputError: the skin is not the sequence's, it has too many joints, or the file would be longer than a GLB can be.
+        OutputError: the file cannot be written.
+    """
+    check_skin(sequence, skin, path)
+    prepared = prepare(sequence)
+    glb = Glb()
+    try:
+        _write(glb, prepared, skin)
+        with unnamed_path(path) as temporary, open(temporary, "wb") as file:
+            try:
+                glb.write(file)
+            except ValueError as exc:
+                raise InputError(f"{path}: {exc}") from exc
+    finally:
+        glb.close()
+    parents = any(shape.parent for shape in prepared.split.shapes)
+    return (*prepared.notes, *(NO_PARENTS if parents else ()))
+
+
+def check_skin(sequence: MeshSequence, skin: Skin, path: Path) -> None:
+    """Raise `InputError` unless a skin is of a sequence's vertices and frames, and a file can hold its joints."""
+    shape = (sequence.n_frames, sequence.n_vertices)
+    if (skin.n_frames, len(skin.bind)) != shape:
+        raise InputError(
+            f"{path}: the skin has {skin.n_frames} frames of {len(skin.bind)} vertices, the sequence {shape[0]} of {shape[1]}; "
+            f"give the skin that was made of it"
+        )
+    if skin.joints > MAX_JOINTS:
+        raise InputError(f"{path}: {skin.joints} joints; glTF holds {MAX_JOINTS}, so make the skin with fewer")
+
+
+def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
+    sources = prepared.split.sources
+    joints = skin.indices[sources].astype(np.uint8 if skin.joints <= 256 else np.uint16)
+    influences = GltfAttribute("JOINTS_0", joints), GltfAttribute("WEIGHTS_0", _as_fractions(skin.weights[sources]), True)
+    normals = normals_of(prepared, 0, prepared.sequence.read(0, 1)[0])
+    shown = influences if normals is None else (normals, *influences)
+    written = write_scene(glb, prepared, skin.bind[sources], shown, is_skinned=True)
+    for one in written:
+        glb.tree["nodes"][one.node]["skin"] = 0
+    nodes, is_key = find_keys(skin)
+    numbers = [_write_joint(glb, nodes, j) for j in range(skin.joints)]
+    root = glb.append("nodes", {"name": "skeleton", "children": [outer for outer, _ in numbers], **prepared.place})
+    glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root})
+    glb.tree["scenes"][0]["nodes"].append(root)
+    _write_keys(glb, prepared.sequence, Keys(nodes, is_key), numbers, float(np.ptp(skin.bind, axis=0).max()))
+
+
+def _as_fractions(weights: Float32) -> UInt16:
+    """Weights ``(W, 4)`` in 1/65535, which add up to exactly 1: the largest one takes what rounding leaves."""
+    rounded = np.rint(weights.astype(np.float64) * FULL).astype(np.int64)
+    rows, largest = np.arange(len(weights)), weights.argmax(axis=1)
+    rounded[rows, largest] += FULL - rounded.sum(axis=1)
+    return rounded.astype(np.uint16)
+
+
+def _write_joint(glb: Glb, nodes: AffineNodes, j: int) -> tuple[int, int]:
+    """The two nodes of a joint as they are in the first frame: the outer one, and the joint itself below it."""
+    inner = glb.append("nodes", {"name": f"joint_{j}", "rotation": _plain(nodes.inner[0, j])})
+    first = {
+        "translation": _plain(nodes.translations[0, j]),
+        "rotation": _plain(nodes.rotations[0, j]),
+        "scale": _plain(nodes.scales[0, j]),
+    }
+    return glb.append("nodes", {"name": f"joint_{j}_frame", "children": [inner], **first}), inner
+
+
+def _write_keys(glb: Glb, sequence: MeshSequence, keys: Keys, numbers: list[tuple[int, int]], extent: float) -> None:
+    """Add the animation: keys of what moves; a skeleton that stands has two of its first joint."""
+    times = (np.arange(len(keys.is_key)) / (PER_FRAME * sequence.fps)).astype(np.float32)[:, None]
+    samplers: list[Json] = []
+    channels: list[Json] = []
+    known: dict[bytes, int] = {}  # times are written once for all joints that share them
+
+    def add(node: int, path: str, is_key: Bool, values: Array) -> None:
+        shown = is_key.tobytes()
+        if shown not in known:
+            known[shown] = glb.array(times[is_key], bounds=True)
+        channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        output = glb.array(values[is_key].astype(np.float32))
+        samplers.append({"input": known[shown], "output": output, "interpolation": "LINEAR"})
+
+    for j, (outer, inner) in enumerate(numbers):
+        for node, path, values, tolerance in (
+            (outer, "translation", keys.nodes.translations[:, j], STANDS * extent),
+            (outer, "rotation", keys.nodes.rotations[:, j], STANDS),
+            (outer, "scale", keys.nodes.scales[:, j], STANDS),
+            (inner, "rotation", keys.nodes.inner[:, j], STANDS),
+        ):
+            if moves(values, tolerance):
+                add(node, path, keys.is_key[:, j], values)
+    if not channels:
+        add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0])
+    name = sequence.metadata.texts.get("clip") or "animation"
+    glb.append("animations", {"name": name, "samplers": samplers, "channels": channels, "extras": {FPS: sequence.fps}})
+
+
+def _plain(values: Array) -> list[float]:
+    """Numbers as the keys have them, so that the rest pose is the first frame."""
+    result: list[float] = values.astype(np.float32).astype(np.float64).tolist()
+    return result

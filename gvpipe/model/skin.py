@@ -1,0 +1,79 @@
+"""A skeleton that moves a mesh: linear blend skinning of a bind pose by affine joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gvpipe.foundation.arrays import Float32, Float64, Int32
+from gvpipe.foundation.errors import InputError
+
+INFLUENCES = 4  # joints that a vertex follows, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Joints, and how a mesh of V vertices follows them in F frames.
+
+    Vertex v of frame k is at ``sum over i  weights[v, i] (A bind[v] + t)``, with ``A = transforms[k, j, :3, :3]`` and
+    ``t = transforms[k, j, :3, 3]`` of joint ``j = indices[v, i]``.
+
+    Args:
+        indices: ``(V, 4) int32`` joints, 0..J-1; 0 where a weight is 0.
+        weights: ``(V, 4) float32``, at least 0; rows add up to exactly 1.
+        bind: ``(V, 3) float32`` model units, relative to the sequence's origin.
+        transforms: ``(F, J, 4, 4) float64`` for columns, model units; affine, the last row is 0 0 0 1.
+        error: largest distance of a vertex from what the skin was made of, in any frame, part of the first frame's diagonal;
+            NaN: not measured.
+
+    Raises:
+        InputError: arrays do not fit each other.
+    """
+
+    indices: Int32
+    weights: Float32
+    bind: Float32
+    transforms: Float64
+    error: float = float("nan")
+
+    def __post_init__(self) -> None:
+        n, (_, n_joints) = len(self.bind), self.transforms.shape[:2]
+        shapes = self.indices.shape, self.weights.shape, self.bind.shape, self.transforms.shape[2:]
+        if shapes != ((n, INFLUENCES), (n, INFLUENCES), (n, 3), (4, 4)):
+            raise InputError(f"a skin's arrays are of shapes {shapes}; (V, 4), (V, 4), (V, 3) and (F, J, 4, 4) are needed")
+        if n and not 0 <= self.indices.min() <= self.indices.max() < n_joints:
+            raise InputError(f"a skin names joints {self.indices.min()}..{self.indices.max()}; there are {n_joints}")
+
+    @property
+    def joints(self) -> int:
+        """J, how many there are."""
+        return int(self.transforms.shape[1])
+
+    @property
+    def n_frames(self) -> int:
+        """F."""
+        return len(self.transforms)
+
+    def evaluate(self, frame: int) -> Float32:
+        """Positions of a frame: ``(V, 3) float32``, model units."""
+        return self.posed(self.transforms[frame])
+
+    def read(self, start: int, stop: int) -> Float32:
+        """Positions of frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units."""
+        frames = [self.evaluate(k) for k in range(start, stop)]
+        return np.stack(frames) if frames else np.zeros((0, *self.bind.shape), np.float32)
+
+    def posed(self, transforms: Float64) -> Float32:
+        """Positions ``(V, 3) float32`` by the joints' transforms ``(J, 4, 4)``."""
+        points = np.concatenate([self.bind, np.ones((len(self.bind), 1))], axis=1)
+        result = np.zeros((len(points), 3))
+        for i in range(INFLUENCES):
+            used = np.flatnonzero(self.weights[:, i])
+            own = transforms[self.indices[used, i], :3]
+            result[used] += self.weights[used, i, None] * np.einsum("vij,vj->vi", own, points[used])
+        return result.astype(np.float32)
+
+    def part(self, start: int, stop: int) -> Skin:
+        """Frames ``start`` to ``stop`` alone."""
+        return replace(self, transforms=self.transforms[start:stop])

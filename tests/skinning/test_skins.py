@@ -1,0 +1,215 @@
+"""Skeletons: what moves a file's vertices, what is found for a sequence, and what readers show of a GLB that holds one."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from asset_scene import scene
+from folders import GOLDEN, ROOT
+from sequences import rigid, waving
+
+import gvpipe
+from gvpipe.foundation.errors import InputError, SettingError
+from gvpipe.io.gltf.reader import read_poses
+from gvpipe.io.scene.affine_nodes import BETWEEN, factor, find_keys, matrices
+from gvpipe.model.skin import Skin
+
+RIGID = GOLDEN / "mcgv-1-rigid.mp4"  # without pictures; has frames that repeat, and vertices that stand still
+THREE = ROOT / "gvpipe" / "web" / "node_modules" / "three"
+
+
+def diagonal(frames: Any) -> float:
+    return float(np.linalg.norm(np.ptp(frames[0], axis=0)))
+
+
+def farthest(a: Any, b: Any) -> float:
+    """Largest distance of a vertex, part of the first frame's diagonal."""
+    return float(np.linalg.norm(np.asarray(a, np.float64) - b, axis=2).max() / diagonal(b))
+
+
+def test_the_skeleton_of_a_file_moves_it_exactly() -> None:
+    with gvpipe.open(RIGID) as video:
+        skin, frames = video.skin(), video[:]
+    assert skin is not None and skin.n_frames == len(frames) and 1 <= skin.joints <= 3
+    assert (skin.weights.sum(axis=1) == 1).all() and (skin.weights >= 0).all()
+    assert farthest(skin.read(0, len(frames)), frames) < 1e-6 and skin.error < 1e-6
+    assert np.array_equal(skin.part(3, 7).evaluate(0), skin.evaluate(3))
+
+
+def test_where_pictures_say_more_the_error_is_told() -> None:
+    with gvpipe.open(GOLDEN / "mcgv-1-h264.mp4") as video:
+        skin, frames = video.skin(), video[:]
+    assert skin is not None and skin.error == pytest.approx(farthest(skin.read(0, len(frames)), frames))
+    assert 1e-4 < skin.error < 0.2
+
+
+@pytest.mark.parametrize("name", ["mcgv-1-affine", "mcgv-1-klt", "pca-1-lsp", "laplacian-1", "pdct-1"])
+def test_files_without_a_skeleton(name: str) -> None:
+    with gvpipe.open(GOLDEN / f"{name}.mp4") as video:
+        assert video.skin() is None
+
+
+def affine(n_frames: int, kind: str) -> Any:
+    """Matrices ``(F, 3, 4, 4)`` whose factors are not unique, in one way or another."""
+    draw = np.random.default_rng(3)
+    result = np.tile(np.eye(4), (n_frames, 3, 1, 1))
+    angle = np.linspace(0, 3, n_frames)
+    turn = np.zeros((n_frames, 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1], turn[:, 2, 2] = -turn[:, 1, 0], 1
+    shapes = {
+        "rigid": np.eye(3), "scaled": 2 * np.eye(3), "two equal scales": np.diag([2.0, 2.0, 0.5]),
+        "flat": np.diag([1.0, 1.0, 0.0]), "mirrored": np.diag([1.0, -1.0, 1.0]), "nothing": np.zeros((3, 3)),
+        "sheared": np.array([[1, 0.7, 0], [0, 1, 0.2], [0, 0, 1.0]]),
+    }  # fmt: skip
+    result[:, :, :3, :3] = turn[:, None] @ (draw.normal(size=(3, 3, 3)) if kind == "any" else shapes[kind])
+    result[:, :, :3, 3] = draw.normal(size=(n_frames, 3, 3))
+    return result
+
+
+@pytest.mark.parametrize("kind", ["rigid", "scaled", "two equal scales", "flat", "mirrored", "nothing", "sheared", "any"])
+def test_affine_motions_are_two_nodes(kind: str) -> None:
+    """Exactly; and factors go on from moment to moment as smoothly as the motion does."""
+    given = affine(40, kind)
+    nodes = factor(given)
+    assert np.allclose(matrices(nodes), given, atol=1e-9)
+    assert (np.linalg.norm(nodes.rotations, axis=-1) == pytest.approx(1)) and nodes.scales.shape == (40, 3, 3)
+    steps = [(one[1:] * one[:-1]).sum(axis=-1).min() for one in (nodes.rotations, nodes.inner)]
+    if kind not in ("any", "nothing"):
+        assert min(steps) > np.cos(0.2)  # quaternions of neighbours are near each other
+
+
+def test_keys_are_where_they_are_needed() -> None:
+    """A joint that stands has two, one that turns evenly few, one that turns far from frame to frame has some between."""
+    given = np.tile(np.eye(4), (33, 3, 1, 1))
+    given[:, 1] = affine(33, "rigid")[:, 0]
+    given[:, 1, :3, 3] = 0
+    given[1::2, 2, :2, :2] = [[-1, 0], [0, -1]]
+    bind = np.random.default_rng(0).random((12, 3), np.float32)
+    indices = np.zeros((12, 4), np.int32)
+    indices[:, 0] = np.arange(12) % 3
+    weights = np.tile(np.array([1, 0, 0, 0], np.float32), (12, 1))
+    nodes, is_key = find_keys(Skin(indices, weights, bind, given))
+    assert is_key[[0, -1]].all() and np.allclose(matrices(nodes)[::4], given)
+    stands, even, wild = is_key.sum(axis=0)
+    assert stands == 2 and even <= 33 < wild
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any, float]:
+    """A file with a skeleton, its frames, and frames a second."""
+    path = tmp_path_factory.mktemp("skin") / "a.glb"
+    with gvpipe.open(RIGID) as video:
+        skin = video.skin()
+        assert gvpipe.write(video.sequence(), path, skin=skin) == []
+        return path, video[:], video.fps
+
+
+def test_it_reads_back(written: tuple[Path, Any, float]) -> None:
+    path, frames, fps = written
+    read = gvpipe.read(path)
+    assert (read.n_frames, read.fps) == (len(frames), fps) and read.not_carried == ()
+    assert farthest(read.read(0, len(frames)), frames) < 1e-5
+    halves = read_poses(path).at(np.asarray((np.arange(len(frames) - 1) + 0.5) / fps, np.float64))
+    assert farthest(halves, (frames[1:] + frames[:-1]) / 2) < 3 * BETWEEN
+
+
+@pytest.mark.skipif(shutil.which("node") is None or not THREE.exists(), reason="no node, or no three.js; npm ci in gvpipe/web")
+def test_three_js_shows_the_same(written: tuple[Path, Any, float]) -> None:
+    path, frames, fps = written
+    shown = [0, 1, len(frames) // 2, len(frames) - 1]
+    command = ["node", str(ROOT / "tests" / "run_skin.mjs"), str(THREE), str(path), *(str(k / fps) for k in shown)]
+    found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    assert farthest(np.array(found).reshape(len(shown), -1, 3), frames[shown]) < 1e-5
+
+
+def test_a_skeleton_is_found_for_a_sequence(tmp_path: Path) -> None:
+    sequence = rigid()
+    skin = gvpipe.skin(sequence, target_kg=0.05)
+    frames = sequence.read(0, sequence.n_frames)
+    assert np.array_equal(skin.bind, frames[0])  # a real frame
+    assert skin.error == pytest.approx(farthest(skin.read(0, len(frames)), frames)) and skin.error < 1e-3
+    gvpipe.write(sequence, tmp_path / "a.glb", skin=skin)
+    assert farthest(gvpipe.read(tmp_path / "a.glb").read(0, len(frames)), frames) < 1e-3
+
+
+def test_fewer_joints_err_more() -> None:
+    sequence = waving(10, 12)
+    errors = [gvpipe.skin(sequence, joints=count).error for count in (1, 4, 16)]
+    assert errors[0] > errors[1] > errors[2]
+
+
+def test_all_else_travels(tmp_path: Path) -> None:
+    """Parts, materials, pictures, colours, uv; the scene's axes and unit are the skeleton's."""
+    sequence = scene()
+    skin = gvpipe.skin(sequence)
+    gvpipe.write(sequence, tmp_path / "plain.glb")
+    gvpipe.write(sequence, tmp_path / "skin.glb", skin=skin)
+    plain, found = gvpipe.read(tmp_path / "plain.glb"), gvpipe.read(tmp_path / "skin.glb")
+    assert found.materials == plain.materials and found.images == plain.images
+    assert [part.name for part in found.parts] == [part.name for part in plain.parts]
+    assert set(found.attributes) == set(plain.attributes) and np.array_equal(found.faces, plain.faces)
+    assert farthest(found.read(0, found.n_frames), plain.read(0, plain.n_frames)) < 3 * skin.error + 1e-5
+
+
+def test_what_is_refused(tmp_path: Path) -> None:
+    sequence = waving(4, 5)
+    skin = gvpipe.skin(sequence, joints=2)
+    with pytest.raises(InputError, match="one .glb"):
+        gvpipe.write(sequence, tmp_path / "a.usdc", skin=skin)
+    with pytest.raises(InputError, match="one .glb"):
+        gvpipe.write(sequence, tmp_path / "%d.glb", skin=skin)
+    with pytest.raises(InputError, match="5 frames of 16 vertices, the sequence 4 of 16"):
+        gvpipe.write(sequence.part(0, 4), tmp_path / "a.glb", skin=skin)
+    with pytest.raises(InputError, match="names joints 0..9"):
+        replace(skin, indices=skin.indices + np.int32(9 - skin.indices.max()) * (skin.indices == skin.indices.max()))
+    with pytest.raises(InputError, match="of shapes"):
+        replace(skin, weights=skin.weights[:, :3])
+    for joints in (-1, 1025, True):
+        with pytest.raises(SettingError, match="joints is"):
+            gvpipe.skin(sequence, joints=joints)
+    assert not list(tmp_path.iterdir())
+
+
+def test_still_and_small_sequences(tmp_path: Path) -> None:
+    still = replace(waving(4, 5), positions=np.broadcast_to(waving(4, 5).read(0, 1), (5, 16, 3)).copy())
+    skin = gvpipe.skin(still)
+    assert skin.error < 1e-6
+    gvpipe.write(still, tmp_path / "a.glb", skin=skin)
+    assert gvpipe.read(tmp_path / "a.glb").n_frames == 5
+
+
+def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
+    ended = run("decode", RIGID, tmp_path / "a.glb", "--json")
+    values = json.loads(ended.out)
+    assert values["joints"] >= 1 and "written with a skeleton" in values["notes"][0]
+    assert "skins" in _tree(tmp_path / "a.glb")
+    assert json.loads(run("decode", RIGID, tmp_path / "b.glb", "--no-skin", "--json").out)["joints"] == 0
+    assert "skins" not in _tree(tmp_path / "b.glb")
+    ended = run("decode", GOLDEN / "pca-1-lsp.mp4", tmp_path / "c.glb")
+    assert ended.status == 0 and "written with morph targets, since the file has no skeleton" in ended.err
+    assert "morph targets" in run("decode", GOLDEN / "mcgv-1-h264.mp4", tmp_path / "d.glb").err
+    assert "up to" in run("decode", GOLDEN / "mcgv-1-h264.mp4", tmp_path / "d.glb", "--skin").err
+    ended = run("decode", GOLDEN / "pca-1-lsp.mp4", tmp_path / "e.glb", "--skin")
+    assert ended.status == 1 and "gvpipe convert --skin" in ended.err and not (tmp_path / "e.glb").exists()
+    gvpipe.write(rigid(), tmp_path / "in.npz")
+    ended = run("convert", tmp_path / "in.npz", tmp_path / "f.glb", "--skin", "--target-kg", "0.05", "--json")
+    assert json.loads(ended.out)["joints"] >= 2 and "a skeleton of" in ended.err
+    assert run("convert", tmp_path / "in.npz", tmp_path / "g.glb", "--joints", "4").status == 2
+    assert run("convert", tmp_path / "in.npz", tmp_path / "g.usdc", "--skin").status == 2
+    ended = run("convert", tmp_path / "in.npz", tmp_path / "g.glb", "--skin", "--frames", "0:1")
+    assert ended.status == 1 and "one frame" in ended.err
+
+
+def _tree(path: Path) -> dict[str, Any]:
+    data = path.read_bytes()
+    tree: dict[str, Any] = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    return tree
