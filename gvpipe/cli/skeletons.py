@@ -63,17 +63,16 @@ def check_skin_options(target: str, is_wanted: bool, others: object) -> None:
 def find_skin(
     sequence: MeshSequence, joints: int, target_kg: float | None, max_error: str | None, progress: Progress | None
 ) -> Found:
-    """A skeleton for a sequence; raises `InputError` if it has one frame, which needs none."""
+    """A skeleton for a sequence, and what to say of it; raises as `fit_skin` does."""
     from gvpipe.rate_control.targets import parse_bound
     from gvpipe.skinning.fit import DEFAULT_KG, Wanted, fit_skin
 
-    if sequence.n_frames < 2:
-        raise InputError(f"{sequence.name} has one frame, which no skeleton moves; leave out --skin")
     bound = None if max_error is None else parse_bound(max_error, sequence)
     wanted = Wanted(DEFAULT_KG if target_kg is None and bound is None else target_kg, bound)
     skin, errors = fit_skin(sequence, joints, wanted, progress)
     kg = "" if errors.kg is None else f"KG {errors.kg:.3g} %, "
-    said = [f"a skeleton of {skin.joints} joints moves it: {kg}vertices are up to {100 * skin.error:.2g} % of the diagonal off"]
+    count = "one joint" if skin.joints == 1 else f"{skin.joints} joints"
+    said = [f"a skeleton of {count} moves it: {kg}vertices are up to {100 * skin.error:.2g} % of the diagonal off"]
     if not wanted.is_met(errors):
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
     return skin, said

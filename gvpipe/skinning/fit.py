@@ -42,10 +42,18 @@ class Wanted:
     Args:
         kg: Karni and Gotsman's error, percent.
         largest: distance of a vertex, model units.
+
+    Raises:
+        SettingError: one of them is no finite number above 0.
     """
 
     kg: float | None = None
     largest: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("target KG", self.kg), ("max error", self.largest)):
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise SettingError(f"{name} is {value!r}; a number above 0 is needed")
 
     def is_met(self, errors: Errors) -> bool:
         """Whether errors are on the allowed side."""
@@ -65,11 +73,13 @@ def fit_skin(
         progress: called with each stage and the part of it that is done.
 
     Raises:
-        InputError: a frame cannot be read.
+        InputError: there is one frame, or a frame cannot be read.
         SettingError: a number of joints out of range.
     """
     if not 0 <= joints <= MOST or isinstance(joints, bool):
         raise SettingError(f"joints is {joints!r}; an integer in 1..{MOST} is needed, or 0 for as many as it takes")
+    if sequence.n_frames < 2:
+        raise InputError(f"{sequence.name} has one frame, which needs no skeleton; write it without one")
     wanted = wanted or Wanted(DEFAULT_KG)
     best: tuple[Skin, Errors] | None = None
     for skin in _candidates(sequence, joints, wanted, progress or silent):

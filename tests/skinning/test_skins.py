@@ -176,6 +176,11 @@ def test_what_is_refused(tmp_path: Path) -> None:
     for joints in (-1, 1025, True):
         with pytest.raises(SettingError, match="joints is"):
             gvpipe.skin(sequence, joints=joints)
+    for kg in (0.0, -1.0, float("nan")):
+        with pytest.raises(SettingError, match="target KG is"):
+            gvpipe.skin(sequence, target_kg=kg)
+    with pytest.raises(InputError, match="one frame"):
+        gvpipe.skin(sequence.part(0, 1))
     assert not list(tmp_path.iterdir())
 
 
