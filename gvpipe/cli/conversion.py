@@ -64,6 +64,7 @@ def convert(
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
     from gvpipe.cli.skeletons import check_skin_options, find_skin
+    from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
@@ -95,7 +96,8 @@ def convert(
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
-    values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "joints": found.joints if found else 0}
+    values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
+    values |= {"joints": found.joints if found else 0} if takes_skin(target) else {}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from asset_scene import scene
 from folders import GOLDEN, ROOT
+from scipy.spatial.transform import Rotation
 from sequences import rigid, waving
 
 import gvpipe
@@ -190,6 +192,21 @@ def test_still_and_small_sequences(tmp_path: Path) -> None:
     assert skin.error < 1e-6
     gvpipe.write(still, tmp_path / "a.glb", skin=skin)
     assert gvpipe.read(tmp_path / "a.glb").n_frames == 5
+
+
+def test_normals_where_the_first_frame_is_not_the_bind_pose(tmp_path: Path) -> None:
+    """Engines turn normals with the joints, so that the bind pose has its own, not the first frame's."""
+    still = waving(4, 1)
+    turns = Rotation.from_rotvec(np.arange(6)[:, None] * [0.3, 0.2, 0.1]).as_matrix()
+    sequence = replace(still, positions=np.einsum("kab,vb->kva", turns, still.read(0, 1)[0]).astype(np.float32))
+    skin = gvpipe.skin(sequence)
+    assert np.abs(skin.transforms[4, :, :3, :3] - np.eye(3)).max() > 0.5
+    for name, start in (("whole", 0), ("part", 4)):
+        gvpipe.write(sequence.part(start, 6), tmp_path / f"{name}.glb", skin=skin.part(start, 6))
+    whole, part = (trimesh.load_mesh(tmp_path / f"{name}.glb", process=False).vertex_normals for name in ("whole", "part"))
+    expected = trimesh.Trimesh(sequence.read(0, 1)[0], sequence.faces, process=False).vertex_normals
+    np.testing.assert_allclose(whole, part, atol=1e-4)
+    assert (whole * expected).sum(axis=1).min() > 0.99
 
 
 def test_decode_and_convert(tmp_path: Path, run: Any) -> None:

@@ -9,11 +9,12 @@ Source: Khronos, glTF 2.0 specification, sections 3.7.3 (skins) and 3.11 (animat
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Bool, Float32, UInt16
+from gvpipe.foundation.arrays import Array, Bool, Float32, Int64, UInt16
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
@@ -76,6 +77,8 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     joints = skin.indices[sources].astype(np.uint8 if skin.joints <= 256 else np.uint16)
     influences = GltfAttribute("JOINTS_0", joints), GltfAttribute("WEIGHTS_0", _as_fractions(skin.weights[sources]), True)
     normals = normals_of(prepared, 0, prepared.sequence.read(0, 1)[0])
+    if normals is not None:
+        normals = replace(normals, values=_to_bind(skin, sources, normals.values))
     shown = influences if normals is None else (normals, *influences)
     written = write_scene(glb, prepared, skin.bind[sources], shown, is_skinned=True)
     for one in written:
@@ -86,6 +89,14 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root})
     glb.tree["scenes"][0]["nodes"].append(root)
     _write_keys(glb, prepared.sequence, Keys(nodes, is_key), numbers, float(np.ptp(skin.bind, axis=0).max()))
+
+
+def _to_bind(skin: Skin, sources: Int64, normals: Array) -> Float32:
+    """Normals ``(W, 3)`` of the first frame as they are in the bind pose: ``A^T n``, since ``A^-T`` takes them to the frame."""
+    first = skin.transforms[0, skin.indices[sources], :3, :3]  # (W, 4, 3, 3)
+    turned = np.einsum("wi,wiab,wa->wb", skin.weights[sources], first, normals)
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    return np.where(length > 0, turned / np.where(length > 0, length, 1), normals).astype(np.float32)
 
 
 def _as_fractions(weights: Float32) -> UInt16:
