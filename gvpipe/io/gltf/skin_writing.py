@@ -29,6 +29,7 @@ from gvpipe.model.skin import Skin
 FULL = 65535  # a weight of 1
 MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
 STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
+TURNED_NORMALS = ("normals of the first frame turn with the skeleton; those of later frames are left out",)
 NO_PARENTS = ("skinned meshes have no nodes above them; names of the parts' parents are left out",)
 
 
@@ -57,7 +58,8 @@ def write_skinned(sequence: MeshSequence, skin: Skin, path: Path) -> tuple[str, 
     finally:
         glb.close()
     parents = any(shape.parent for shape in prepared.split.shapes)
-    return (*prepared.notes, *(NO_PARENTS if parents else ()))
+    own = prepared.normals is not None and prepared.normals.is_field
+    return (*prepared.notes, *(NO_PARENTS if parents else ()), *(TURNED_NORMALS if own else ()))
 
 
 def check_skin(sequence: MeshSequence, skin: Skin, path: Path) -> None:
