@@ -232,12 +232,13 @@ def decode(
     from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
     from gvpipe.cli.choices import chosen, chosen_frames
-    from gvpipe.cli.skeletons import skin_of_video
+    from gvpipe.cli.skeletons import check_skin_options, skin_of_video
     from gvpipe.foundation import notes
     from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
+    check_skin_options(target, skin is True)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given, unlimited=unlimited)

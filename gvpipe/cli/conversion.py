@@ -70,7 +70,7 @@ def convert(
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
-    check_skin_options(target, skin and not split, (joints, target_kg, max_error) != (0, None, None))
+    check_skin_options(target, skin, split, (joints, target_kg, max_error) != (0, None, None))
     if split:
         if lod or start is not None or stop is not None or target == PIPE:
             raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")

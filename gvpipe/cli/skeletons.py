@@ -52,12 +52,12 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
     return skin.part(*frames), [f"written with a skeleton of {skin.joints} joints, {how}; --no-skin writes morph targets"]
 
 
-def check_skin_options(target: str, is_wanted: bool, others: object) -> None:
+def check_skin_options(target: str, is_wanted: bool, is_split: bool = False, others: bool = False) -> None:
     """Raise `click.UsageError` for options of skeletons where none is written."""
     if others and not is_wanted:
-        raise click.UsageError("--joints, --target-kg and --max-error are of --skin, which goes without --split")
-    if is_wanted and not takes_skin(target):
-        raise click.UsageError(f"--skin writes one .glb; OUTPUT is {target!r}")
+        raise click.UsageError("--joints, --target-kg and --max-error are of --skin")
+    if is_wanted and (is_split or not takes_skin(target)):
+        raise click.UsageError(f"--skin writes one .glb, without --split; OUTPUT is {target!r}")
 
 
 def find_skin(
@@ -72,7 +72,8 @@ def find_skin(
     skin, errors = fit_skin(sequence, joints, wanted, progress)
     kg = "" if errors.kg is None else f"KG {errors.kg:.3g} %, "
     count = "one joint" if skin.joints == 1 else f"{skin.joints} joints"
-    said = [f"a skeleton of {count} moves it: {kg}vertices are up to {100 * skin.error:.2g} % of the diagonal off"]
+    off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else f"{errors.max:.2g} units"
+    said = [f"a skeleton of {count} moves it: {kg}vertices are up to {off} off"]
     if not wanted.is_met(errors):
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
     return skin, said

@@ -107,6 +107,7 @@ def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Pro
             return
         last = coarse.joints
         yield refit(coarse, sequence, report)
+        yield coarse  # better where the codec's bind pose is smoother than the first frame
 
 
 def refit(skin: Skin, sequence: MeshSequence, report: Progress = silent) -> Skin:
