@@ -7,18 +7,16 @@ Source: Kitware, VTK file formats, "XML file formats", section "Multiblock".
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.cells import Cells, join_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, only_some
+from gvpipe.io.simulation.dataset import Dataset, field_data, join_arrays
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 from gvpipe.io.simulation.xml_root import parse_xml
@@ -47,10 +45,9 @@ def join_blocks(named: list[Named]) -> Dataset:
             made.append(join_cells(pieces, np.cumsum([0, *sizes[:-1]]).tolist()))
         return made[0]
 
-    point_data, left = _joined([dict(each.point_data) for each in sets])
-    cell_data, more = _joined([dict(each.cell_data) for each in sets])
     lost = LeftBehind()
-    lost.add_all(only_some(name, "blocks") for name in (*left, *more))
+    point_data = join_arrays([each.point_data for each in sets], "blocks", lost)
+    cell_data = join_arrays([each.cell_data for each in sets], "blocks", lost)
     for each in sets:
         lost.add_all(each.not_carried)
     names = _unlike([name or f"block_{number}" for number, (name, _) in enumerate(named)])
@@ -94,20 +91,6 @@ def _listed(element: ElementTree.Element, above: str, depth: int) -> Iterator[tu
             yield name or above, each.get("file") or ""
         elif each.tag in ("Block", "Partitions"):
             yield from _listed(each, name or above, depth + 1)
-
-
-def _joined(found: list[dict[str, DataArray]]) -> tuple[dict[str, DataArray], list[str]]:
-    """Arrays that all data sets have, one set after the other, and the names of the others."""
-
-    def read(name: str) -> Array:
-        arrays = [np.asarray(data[name].read()) for data in found]
-        return np.concatenate([each.reshape(len(each), -1) for each in arrays])
-
-    every = list(dict.fromkeys(name for data in found for name in data))
-    shared = [name for name in every if all(name in data for data in found)]
-    made: dict[str, Callable[[], Array]] = {name: partial(read, name) for name in shared}
-    arrays = {name: DataArray(made[name], found[0][name].kind, found[0][name].unit) for name in shared}
-    return arrays, [name for name in every if name not in arrays]
 
 
 def _unlike(names: list[str]) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy as np
 from gvpipe.asset.attribute import MAX_COMPONENTS, WIDTHS
 from gvpipe.asset.part import Part
 from gvpipe.foundation.arrays import Array, Floats
+from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.mesh import FrameValues
 from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.surface import Surface
@@ -91,6 +94,25 @@ def _reader(name: str, one: DataArray, domain: str, rows: Array) -> Callable[[],
     return read
 
 
+def join_arrays(found: Sequence[Mapping[str, DataArray]], parts: str, left: LeftBehind) -> dict[str, DataArray]:
+    """Arrays that all parts of a step have, one part after the other; names of others are left behind.
+
+    Args:
+        found: of each part, by name.
+        parts: what they are called, such as ``"blocks"``.
+        left: takes what only some have.
+    """
+
+    def read(name: str) -> Array:
+        arrays = [np.asarray(data[name].read()) for data in found]
+        return np.concatenate([each.reshape(len(each), math.prod(each.shape[1:])) for each in arrays])
+
+    every = dict.fromkeys(name for data in found for name in data)
+    shared = [name for name in every if all(name in data for data in found)]
+    left.add_all(f"numbers {name!r} of some {parts}" for name in every if name not in shared)
+    return {name: DataArray(partial(read, name), found[0][name].kind, found[0][name].unit) for name in shared}
+
+
 def text_array(name: str) -> str:
     """What is said of an array of texts."""
     return f"text array {name!r}"
@@ -99,11 +121,6 @@ def text_array(name: str) -> str:
 def field_data(name: str) -> str:
     """What is said of an array that belongs to the whole step, not to its points or cells."""
     return f"field data {name!r}"
-
-
-def only_some(name: str, parts: str) -> str:
-    """What is said of an array that not all blocks or pieces of a step have."""
-    return f"numbers {name!r} of some {parts}"
 
 
 def plain_numbers(values: Array) -> Array:

@@ -82,7 +82,7 @@ class _Cursor:
         return values.astype(np.float64).astype(dtype) if dtype.kind == "f" else values.astype(np.int64).astype(dtype)
 
     def skip_texts(self, count: int, what: str) -> None:
-        """Pass over texts: a line each, or, in binary, bytes behind their number, whose size its two highest bits say."""
+        """Pass over texts: a line each; in binary, bytes behind their number. Its two highest bits say how long it is."""
         check_bytes((count,), 1, len(self._data), what)
         self.line()
         for _ in range(count):

@@ -15,7 +15,7 @@ import numpy as np
 from gvpipe.foundation.arrays import Array, Floats
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
-from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, only_some, text_array
+from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, join_arrays, text_array
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.xml_arrays import TYPES, VtkXml, parse_vtk_xml, read_array
@@ -50,22 +50,10 @@ def load_xml_grid(path: Path) -> Dataset:
     return Dataset(
         lambda: np.concatenate([piece.points() for piece in pieces]),
         cells,
-        _joined([dict(piece.point_data) for piece in pieces], left),
-        _joined([dict(piece.cell_data) for piece in pieces], left),
+        join_arrays([piece.point_data for piece in pieces], "pieces", left),
+        join_arrays([piece.cell_data for piece in pieces], "pieces", left),
         not_carried=tuple(dict.fromkeys([*left.names, *(name for piece in pieces for name in piece.not_carried)])),
     )
-
-
-def _joined(found: list[dict[str, DataArray]], left: LeftBehind) -> dict[str, DataArray]:
-    """Arrays that all pieces have, one piece after the other; the names of others are noted."""
-
-    def read(name: str) -> Array:
-        return np.concatenate([data[name].read() for data in found])
-
-    every = dict.fromkeys(name for data in found for name in data)
-    shared = [name for name in every if all(name in data for data in found)]
-    left.add_all(only_some(name, "pieces") for name in every if name not in shared)
-    return {name: DataArray(partial(read, name), found[0][name].kind) for name in shared}
 
 
 def _pieces(path: Path, depth: int) -> list[Source]:

@@ -10,6 +10,8 @@ import pytest
 
 import gvpipe
 from gvpipe.foundation.errors import InputError
+from gvpipe.io.left_behind import LeftBehind
+from gvpipe.io.simulation.dataset import DataArray, join_arrays
 
 GRID = """<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>
 <Piece NumberOfPoints="{n}" NumberOfCells="{m}"><Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{points}
@@ -168,3 +170,19 @@ def test_what_is_inside_of_volumes_is_named(tmp_path: Path) -> None:
     assert found.not_carried == ("inner points (8)", "volume cells (27)")
     report = gvpipe.encode(found, tmp_path / "a.mp4", codec="pca")
     assert report.not_carried == ["inner points (8)", "volume cells (27)"]
+
+
+def test_blocks_without_rows_join_others() -> None:
+    """A part of a mesh may hold nothing, as pieces of parallel runs do."""
+    left = LeftBehind()
+    held = [
+        {"t": _numbers(np.zeros(0)), "v": _numbers(np.zeros((0, 3)))},
+        {"t": _numbers(np.ones(2)), "v": _numbers(np.ones((2, 3)))},
+    ]
+    joined = join_arrays([*held, {"t": _numbers(np.ones(1))}], "blocks", left)
+    assert joined["t"].read().tolist() == [[1], [1], [1]] and left.names == ("numbers 'v' of some blocks",)
+    assert join_arrays(held, "blocks", left)["v"].read().shape == (2, 3)
+
+
+def _numbers(values: Any) -> DataArray:
+    return DataArray(lambda: values)
