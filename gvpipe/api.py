@@ -318,13 +318,11 @@ def skin(
         InputError: the source cannot be read.
         SettingError: an argument out of range.
     """
-    from gvpipe.playback.files import read
-    from gvpipe.skinning.fit import DEFAULT_KG, Wanted, fit_skin
+    from gvpipe.skinning.fit import fit_skin
 
     sequence = source if isinstance(source, MeshSequence) else read(source)
     bound = None if max_error is None else parse_bound(max_error, sequence)
-    wanted = Wanted(DEFAULT_KG if target_kg is None and bound is None else target_kg, bound)
-    return fit_skin(sequence, joints, wanted, progress)[0]
+    return fit_skin(sequence, joints, target_kg, bound, progress).skin
 
 
 def render(

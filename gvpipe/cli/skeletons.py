@@ -49,7 +49,7 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
     if wanted is None and not skin.error <= EXACT:
         return None, [f"written with morph targets, since the file's skeleton is up to {off} off (--skin takes it)"]
     how = "exact" if skin.error <= EXACT else f"up to {off} off"
-    return skin.part(*frames), [f"written with a skeleton of {skin.joints} joints, {how}; --no-skin writes morph targets"]
+    return skin.part(*frames), [f"written with a skeleton of {_joints(skin)}, {how}; --no-skin writes morph targets"]
 
 
 def check_skin_options(target: str, is_wanted: bool, is_split: bool = False, others: bool = False) -> None:
@@ -65,15 +65,17 @@ def find_skin(
 ) -> Found:
     """A skeleton for a sequence, and what to say of it; raises as `fit_skin` does."""
     from gvpipe.rate_control.targets import parse_bound
-    from gvpipe.skinning.fit import DEFAULT_KG, Wanted, fit_skin
+    from gvpipe.skinning.fit import fit_skin
 
     bound = None if max_error is None else parse_bound(max_error, sequence)
-    wanted = Wanted(DEFAULT_KG if target_kg is None and bound is None else target_kg, bound)
-    skin, errors = fit_skin(sequence, joints, wanted, progress)
+    skin, errors, is_met = fit_skin(sequence, joints, target_kg, bound, progress)
     kg = "" if errors.kg is None else f"KG {errors.kg:.3g} %, "
-    count = "one joint" if skin.joints == 1 else f"{skin.joints} joints"
     off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else f"{errors.max:.2g} units"
-    said = [f"a skeleton of {count} moves it: {kg}vertices are up to {off} off"]
-    if not wanted.is_met(errors):
+    said = [f"a skeleton of {_joints(skin)} moves it: {kg}vertices are up to {off} off"]
+    if not is_met:
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
     return skin, said
+
+
+def _joints(skin: Skin) -> str:
+    return "one joint" if skin.joints == 1 else f"{skin.joints} joints"

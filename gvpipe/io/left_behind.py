@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable
+
+COUNT = re.compile(r" \(\d+\)$")  # of things that were met several times
 
 
 class LeftBehind:
@@ -36,3 +39,9 @@ class LeftBehind:
     def names(self) -> tuple[str, ...]:
         """What was met, in alphabetical order, with the number of times where there are several."""
         return tuple(name if count == 1 else f"{name} ({count})" for name, count in sorted(self._counts.items()))
+
+
+def met_later(first: Iterable[str], later: Iterable[str]) -> list[str]:
+    """Names of a later file that the first one has not, however often either met them."""
+    known = {COUNT.sub("", name) for name in first}
+    return [name for name in later if COUNT.sub("", name) not in known]

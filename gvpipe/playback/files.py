@@ -94,8 +94,8 @@ def read_runs(
 def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | None = None) -> list[str]:
     """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
 
-    With a ``skin`` of it (`gvpipe.skin`, `Player.skin`), a ``.glb`` has its skeleton in place of morph targets, and the frames
-    are as the skeleton moves them.
+    With a ``skin`` of it (`gvpipe.skin`, `Player.skin`), a ``.glb`` has its skeleton in place of morph targets. Frames are
+    then as the skeleton moves them.
 
     Returns notes: what the format cannot hold, a line each.
 

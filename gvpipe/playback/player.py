@@ -131,7 +131,7 @@ class Player:
 
         with in_file(self.path):
             skin = read_skin(self.bitstream)
-        return None if skin is None else measured(skin, self.sequence())
+        return None if skin is None else measured(skin, self.sequence())[0]
 
     def outline(self) -> Outline:
         """What `gvpipe.info` tells of the mesh, from what is decoded."""

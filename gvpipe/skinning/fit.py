@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -61,33 +61,45 @@ class Wanted:
         return (self.kg is None or kg <= self.kg) and (self.largest is None or largest <= self.largest)
 
 
+class Fitted(NamedTuple):
+    """A skeleton, its errors, and whether these are as small as they should be."""
+
+    skin: Skin
+    errors: Errors
+    is_met: bool
+
+
 def fit_skin(
-    sequence: MeshSequence, joints: int = 0, wanted: Wanted | None = None, progress: Progress | None = None
-) -> tuple[Skin, Errors]:
-    """The skeleton with the fewest joints that holds an error, or the best of those that were tried, and its errors.
+    sequence: MeshSequence,
+    joints: int = 0,
+    kg: float | None = None,
+    largest: float | None = None,
+    progress: Progress | None = None,
+) -> Fitted:
+    """The skeleton with the fewest joints that holds an error, or the best of those that were tried.
 
     Args:
         sequence: to be moved.
         joints: how many, 1..1024; 0: as many as it takes.
-        wanted: the error; by default a KG error of `DEFAULT_KG`.
+        kg, largest: as of `Wanted`; where neither is given, a KG error of `DEFAULT_KG`.
         progress: called with each stage and the part of it that is done.
 
     Raises:
         InputError: there is one frame, or a frame cannot be read.
-        SettingError: a number of joints out of range.
+        SettingError: a number of joints or an error out of range.
     """
     if not 0 <= joints <= MOST or isinstance(joints, bool):
         raise SettingError(f"joints is {joints!r}; an integer in 1..{MOST} is needed, or 0 for as many as it takes")
     if sequence.n_frames < 2:
         raise InputError(f"{sequence.name} has one frame, which needs no skeleton; write it without one")
-    wanted = wanted or Wanted(DEFAULT_KG)
-    best: tuple[Skin, Errors] | None = None
+    wanted = Wanted(DEFAULT_KG if kg is None and largest is None else kg, largest)
+    best: Fitted | None = None
     for skin in _candidates(sequence, joints, wanted, progress or silent):
-        errors = measure_errors(sequence, lambda start, stop, own=skin: own.read(start, stop))  # type: ignore[misc]
-        found = replace(skin, error=errors.max_diag if errors.max_diag is not None else math.nan), errors
-        if wanted.is_met(errors):
+        own, errors = measured(skin, sequence)
+        found = Fitted(own, errors, wanted.is_met(errors))
+        if found.is_met:
             return found
-        if best is None or errors.rmse < best[1].rmse:
+        if best is None or errors.rmse < best.errors.rmse:
             best = found
     if best is None:
         raise InputError(f"{sequence.name}: no skeleton was found; its frames have fewer than two vertices")
@@ -149,13 +161,13 @@ def _blend(skin: Skin, points: Float64) -> sparse.csr_array:
 
 
 def _to_model(rows: Float64, centre: Float64, diagonal: float) -> Float64:
-    """``(J, 3, 4)`` less identity, of model units, from ``rows (J, 4, 3)`` of points in a box of size 1 around 0."""
+    """``(J, 3, 4)`` less identity, in model units, from ``rows (J, 4, 3)`` of points in a unit box around 0."""
     linear = np.swapaxes(rows[:, :3], 1, 2)
     shift = diagonal * rows[:, 3] - linear @ centre
     return np.concatenate([linear, shift[:, :, None]], axis=2)
 
 
-def measured(skin: Skin, sequence: MeshSequence) -> Skin:
-    """The skin with its largest error about the frames of a sequence."""
-    errors = measure_errors(sequence, lambda start, stop: skin.read(start, stop))
-    return replace(skin, error=math.nan if errors.max_diag is None else errors.max_diag)
+def measured(skin: Skin, sequence: MeshSequence) -> tuple[Skin, Errors]:
+    """The skin with its largest error about the frames of a sequence, and all errors."""
+    errors = measure_errors(sequence, skin.read)
+    return replace(skin, error=math.nan if errors.max_diag is None else errors.max_diag), errors

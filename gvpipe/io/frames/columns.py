@@ -10,7 +10,6 @@ Normals per corner cannot be a field: fields have one row per vertex or triangle
 from __future__ import annotations
 
 import contextlib
-import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,10 +22,10 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.fetching import is_elsewhere
 from gvpipe.io.frames.frame_files import FrameFiles
+from gvpipe.io.left_behind import met_later
 from gvpipe.io.mesh import FrameValues, Mesh, too_wide
 from gvpipe.io.normals.own import FIRST_NORMALS, entries_of, own_rule
 
-COUNT = re.compile(r" \(\d+\)$")  # of things that were met several times
 SAMPLES = 3  # files that are compared with the first before all are
 
 
@@ -98,8 +97,7 @@ def split_columns(frames: FrameFiles) -> Columns:
     }
     attributes = {name: each for name, each in statics.items() if name not in fields}
     notes = (FIRST_NORMALS,) if corners else ()
-    known = {COUNT.sub("", name) for name in frames.first.not_carried}
-    more = [name for mesh in looked_at for name in mesh.not_carried if COUNT.sub("", name) not in known]
+    more = met_later(frames.first.not_carried, (name for mesh in looked_at for name in mesh.not_carried))
     return Columns(
         attributes, fields, notes, (*too_wide(left), *(f"{name} of later frames" for name in late), *dict.fromkeys(more))
     )

@@ -16,8 +16,8 @@ import numpy as np
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.fetching import is_elsewhere
 from gvpipe.io.formats import FRAME_FORMATS
-from gvpipe.io.frames.columns import COUNT
 from gvpipe.io.frames.frame_files import load_mesh
+from gvpipe.io.left_behind import met_later
 from gvpipe.io.mesh import Mesh
 
 HAVE_LOOKS = (".obj", ".ply", ".gltf", ".glb")
@@ -57,8 +57,7 @@ def _compared(first: Mesh, later: Mesh) -> list[str]:
     found = [f"{name} of later frames" for name in differing]
     if _looks(first) != _looks(later):
         found.append(CHANGES)
-    known = {COUNT.sub("", name) for name in first.not_carried}
-    return [*found, *(name for name in later.not_carried if COUNT.sub("", name) not in known)]
+    return [*found, *met_later(first.not_carried, later.not_carried)]
 
 
 def _looks(mesh: Mesh) -> tuple[Any, ...]:

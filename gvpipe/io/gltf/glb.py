@@ -10,11 +10,16 @@ import io
 import json
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.atomic import unnamed_path
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.document import BINARY_CHUNK, CHUNK, HEADER, JSON_CHUNK, MAGIC
 from gvpipe.io.gltf.json_fields import Json
 
@@ -131,6 +136,26 @@ class Glb:
         if bounds:
             item |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         return item
+
+
+@contextmanager
+def glb_at(path: Path) -> Iterator[Glb]:
+    """A file in the making, which is at the path once the block ends without an error.
+
+    Raises:
+        InputError: it would be longer than a GLB can be.
+        OutputError: the file cannot be written.
+    """
+    glb = Glb()
+    try:
+        yield glb
+        with unnamed_path(path) as temporary, open(temporary, "wb") as file:
+            try:
+                glb.write(file)
+            except ValueError as exc:
+                raise InputError(f"{path}: {exc}") from exc
+    finally:
+        glb.close()
 
 
 def _component(dtype: Any) -> int:

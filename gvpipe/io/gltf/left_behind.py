@@ -10,7 +10,7 @@ from typing import Any
 from gvpipe.io.gltf.attribute_names import is_taken
 from gvpipe.io.gltf.clips import FPS, moving_nodes
 from gvpipe.io.gltf.document import LOOKS, TAKEN, Document
-from gvpipe.io.gltf.geometry import is_matrix
+from gvpipe.io.gltf.geometry import TRIANGLES, is_matrix
 from gvpipe.io.gltf.instances import DEFAULTS, EXTENSION
 from gvpipe.io.gltf.json_fields import Json, child, extension, integer, objects
 from gvpipe.io.gltf.looks import TAKEN_LOOKS
@@ -18,7 +18,6 @@ from gvpipe.io.gltf.pointers import animated_property, pointer_of, shown_pointer
 from gvpipe.io.left_behind import LeftBehind
 
 MOST = 1_000_000  # values of the JSON that are looked at
-TRIANGLES = 4  # the first mode of primitives that is of triangles
 MORPHED = ("POSITION", "NORMAL")  # of morph targets
 
 

@@ -15,11 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Bool, Float32, Int64, UInt16
-from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
-from gvpipe.io.gltf.glb import Glb
+from gvpipe.io.gltf.glb import Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
 from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
@@ -47,16 +46,8 @@ def write_skinned(sequence: MeshSequence, skin: Skin, path: Path) -> tuple[str, 
     """
     check_skin(sequence, skin, path)
     prepared = prepare(sequence)
-    glb = Glb()
-    try:
+    with glb_at(path) as glb:
         _write(glb, prepared, skin)
-        with unnamed_path(path) as temporary, open(temporary, "wb") as file:
-            try:
-                glb.write(file)
-            except ValueError as exc:
-                raise InputError(f"{path}: {exc}") from exc
-    finally:
-        glb.close()
     parents = any(shape.parent for shape in prepared.split.shapes)
     own = prepared.normals is not None and prepared.normals.is_field
     return (*prepared.notes, *(NO_PARENTS if parents else ()), *(TURNED_NORMALS if own else ()))
@@ -85,16 +76,16 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     written = write_scene(glb, prepared, skin.bind[sources], shown, is_skinned=True)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
-    nodes, is_key = find_keys(skin)
-    numbers = [_write_joint(glb, nodes, j) for j in range(skin.joints)]
+    keys = find_keys(skin)
+    numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
     root = glb.append("nodes", {"name": "skeleton", "children": [outer for outer, _ in numbers], **prepared.place})
     glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root})
     glb.tree["scenes"][0]["nodes"].append(root)
-    _write_keys(glb, prepared.sequence, Keys(nodes, is_key), numbers, float(np.ptp(skin.bind, axis=0).max()))
+    _write_keys(glb, prepared.sequence, keys, numbers, float(np.ptp(skin.bind, axis=0).max()))
 
 
 def _to_bind(skin: Skin, sources: Int64, normals: Array) -> Float32:
-    """Normals ``(W, 3)`` of the first frame as they are in the bind pose: ``A^T n``, since ``A^-T`` takes them to the frame."""
+    """Normals ``(W, 3)`` of the first frame, as the bind pose has them: ``A^T n``. ``A^-T`` takes them to the frame."""
     first = skin.transforms[0, skin.indices[sources], :3, :3]  # (W, 4, 3, 3)
     turned = np.einsum("wi,wiab,wa->wb", skin.weights[sources], first, normals)
     length = np.linalg.norm(turned, axis=1, keepdims=True)

@@ -15,10 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float32
-from gvpipe.foundation.atomic import unnamed_path
-from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.clips import FPS
-from gvpipe.io.gltf.glb import VERTICES, Glb
+from gvpipe.io.gltf.glb import VERTICES, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.normal_writing import NORMAL
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, normals_of, prepare, write_scene
@@ -61,16 +59,8 @@ def write_animated(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         OutputError: the file cannot be written.
     """
     prepared = prepare(sequence)
-    glb = Glb()
-    try:
+    with glb_at(path) as glb:
         n_targets = _write_animation(glb, prepared)
-        with unnamed_path(path) as temporary, open(temporary, "wb") as file:
-            try:
-                glb.write(file)
-            except ValueError as exc:
-                raise InputError(f"{path}: {exc}") from exc
-    finally:
-        glb.close()
     return (*prepared.notes, *_animation_notes(n_targets))
 
 

@@ -100,12 +100,6 @@ class Lines:
             left.add("smoothing of some faces alone")
         return left.names
 
-    def deep_uv(self) -> tuple[str, ...]:
-        """What texture coordinates lose: their third number, where it is not 0."""
-        values, counts = self.table(b"vt")
-        thirds = values[np.cumsum(counts)[counts > 2] - 1]
-        return ("third numbers of 'vt'",) if thirds.any() else ()
-
     def faces(self, text: UInt8, starts: Int64) -> Faces:
         """The face lines, relative indices resolved."""
         is_face = self.is_kind(b"f")

@@ -34,7 +34,6 @@ ALIASES = {"bump": "map_bump", "map_tr": "map_d", "map_ns": "map_Ns"}
 KNOWN = {  # statements that are read
     "kd", "d", "tr", "ke", "ns", "pm", "pr", "pc", "pcr", "ps", "aniso", "anisor", "ni", "ka",
 }  # fmt: skip
-DEFAULT_IOR = Material().ior
 # other statements, and what they say then
 SAYS_NOTHING = {"tf": ("1",), "illum": ("1", "2"), "sharpness": ("60",)}
 DEFAULTS = {
@@ -93,7 +92,7 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
     sheen = _number(statements.get("ps", ""), 0)
     others = {key: rest for key, rest in statements.items() if key not in maps and key not in KNOWN}
     pictures.left.add_all(f"material statement {key}" for key, rest in others.items() if _says(key, rest))
-    refraction = _number(statements.get("ni", ""), DEFAULT_IOR)
+    refraction = _number(statements.get("ni", ""), Material.ior)
     shine = min(max(_number(statements.get("ns", ""), 0), 0), 1000)
     normal = maps.get("norm") or maps.get("map_bump")
     packed = _packed(maps.get("map_pr"), maps.get("map_pm"))
@@ -122,7 +121,7 @@ def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Mate
         sheen_color=(sheen, sheen, sheen),
         anisotropy_strength=_number(statements.get("aniso", ""), 0),
         anisotropy_rotation=2 * math.pi * _number(statements.get("anisor", ""), 0),
-        ior=refraction if refraction > 1 else DEFAULT_IOR,
+        ior=refraction if refraction > 1 else Material.ior,
     )
 
 

@@ -17,7 +17,6 @@ MAPS = {
     "emissive_texture": ("map_Ke",),
     "normal_texture": ("norm",),
 }
-DEFAULT_IOR = Material().ior
 
 
 def write_mtl(materials: Sequence[Material], names: Sequence[str], pictures: Sequence[str]) -> tuple[str, list[str]]:
@@ -45,7 +44,7 @@ def _statements(material: Material, pictures: Sequence[str]) -> list[str]:
         f"Pm {material.metallic!r}",
         f"d {1.0 if material.alpha_mode == 'opaque' else alpha!r}",
         "illum 2",
-        *([f"Ni {material.ior!r}"] if material.ior > 1 and material.ior != DEFAULT_IOR else []),
+        *([f"Ni {material.ior!r}"] if material.ior > 1 and material.ior != Material.ior else []),
         *([f"Pc {material.clearcoat!r}", f"Pcr {material.clearcoat_roughness!r}"] if material.clearcoat else []),
     ]
     for role, keywords in MAPS.items():

@@ -83,9 +83,10 @@ class ObjLoader:
         self._face_lines = b"" if b"-" in face_lines.tobytes() else face_lines.tobytes()
         materials, images, notes, left = load_materials(named, keys, path)
         attributes: dict[str, Any] = {}
+        numbers = {b"vt": lines.table(b"vt")}
         for name, keyword, index in (("uv", b"vt", corners.vt), ("normal", b"vn", corners.vn)):
             if (index != -1).any():
-                table = _table(lines, keyword, index)
+                table = _table(*(numbers.get(keyword) or lines.table(keyword)), keyword, index)
                 attributes[name] = indexed(table, index[triangles].reshape(-1), faces, len(positions), name)
         animated: dict[str, Callable[[], FrameValues]] = {}
         self._normals_of, self._has_colors = "", colors is not None
@@ -104,13 +105,18 @@ class ObjLoader:
             materials,
             images,
             animated=animated,
-            not_carried=(*lines.strange(), *lines.deep_uv(), *left),
+            not_carried=(*lines.strange(), *_deep_uv(*numbers[b"vt"]), *left),
         )
 
 
-def _table(lines: Lines, keyword: bytes, index: Int64) -> Float32:
-    """The entries of a kind, which corners refer to."""
-    values, counts = lines.table(keyword)
+def _deep_uv(values: Float64, counts: Int64) -> tuple[str, ...]:
+    """What texture coordinates lose: their third number, where it is not 0."""
+    thirds = values[np.cumsum(counts)[counts > 2] - 1]
+    return ("third numbers of 'vt'",) if thirds.any() else ()
+
+
+def _table(values: Float64, counts: Int64, keyword: bytes, index: Int64) -> Float32:
+    """The entries of a kind, which corners refer to, from the numbers of their lines and how many each line has."""
     if keyword == b"vt" and (counts == 1).any():  # v is 0 where it is not given
         ends = np.cumsum(counts)
         values, counts = np.insert(values, ends[counts == 1], 0.0), np.where(counts == 1, 2, counts)
@@ -125,7 +131,7 @@ def _normals(lines: Lines, corners: Faces, by_vertex: bool, n_vertices: int) -> 
 
     Corners at a vertex whose normals were one in the first file, and are not in this, are given one of them.
     """
-    table = _table(lines, b"vn", corners.vn)
+    table = _table(*lines.table(b"vn"), b"vn", corners.vn)
     padded = np.concatenate([table, np.zeros((1, 3), np.float32)])
     if by_vertex:
         rows = np.full(n_vertices, -1, np.int64)
@@ -137,7 +143,7 @@ def _normals(lines: Lines, corners: Faces, by_vertex: bool, n_vertices: int) -> 
 def _colors(values: Float64, counts: Int64) -> Any:
     """Colours ``(V, 4) uint8`` of lines x y z [w] r g b, white where a line has none; None where no line has any.
 
-    Seven numbers are x y z r g b a where the fourth is not always 1, as a weight is, and the last one is.
+    Seven numbers are x y z r g b a where the last one is always 1 and the fourth, a weight otherwise, is not.
     """
     has_color = np.isin(counts, (6, 7))
     if not has_color.any():

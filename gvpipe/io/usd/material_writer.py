@@ -10,7 +10,6 @@ from gvpipe.io.usd.names import identifier, name_prim
 from gvpipe.model.sequence import MeshSequence
 
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
-DEFAULT_IOR = 1.5
 
 
 class MaterialWriter:
@@ -76,7 +75,7 @@ class MaterialWriter:
             self._input(surface, "clearcoat", types.Float, coat, material.clearcoat_texture, "r", one)
             rough_texture, other = material.clearcoat_roughness_texture, (1.0, coat_roughness, 1.0, 1.0)
             self._input(surface, "clearcoatRoughness", types.Float, coat_roughness, rough_texture, "g", other)
-        if material.ior != DEFAULT_IOR:
+        if material.ior != Material.ior:
             surface.CreateInput("ior", types.Float).Set(material.ior)
         if material.normal_texture:
             self._input(surface, "normal", types.Normal3f, None, material.normal_texture, "rgb", None)

@@ -109,7 +109,7 @@ class Materials:
             clearcoat_texture=coat_texture.texture if coat_texture else None,
             clearcoat_roughness=coat_roughness,
             clearcoat_roughness_texture=coat_roughness_texture.texture if coat_roughness_texture else None,
-            ior=self._number(surface, "ior", 1.5)[0],
+            ior=self._number(surface, "ior", Material.ior)[0],
         )
 
     def _note_losses(self, name: str, surface: Any, base: Any, opacity: Any) -> None:

@@ -52,7 +52,7 @@ def read_skin(bitstream: Bitstream) -> Skin | None:
     indices[surface.vertices] = blend.weights.clusters[surface.slot]
     weights[surface.vertices] = blend.weights.weights[surface.slot] / np.float32(TOTAL)  # exact: TOTAL is a power of two
     bind: Float32 = np.empty((n_vertices, 3), np.float32)
-    bind[:] = surface.rest if len(surface.rest) else 0
+    surface.fill_still(bind[None])
     bind[surface.vertices] = surface.base[surface.slot]
     used = len(surface.vertices) < n_vertices
     return Skin(indices, weights, bind, transforms if used else transforms[:, :-1])

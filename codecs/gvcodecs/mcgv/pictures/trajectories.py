@@ -109,7 +109,7 @@ def decode_segment(
     transforms = decode_coefficients(rows, matrix.shape[1] // 4, n_components, step, cursor.name)
     _decode_outliers(cursor, samples)
     samples *= step
-    samples += np.ascontiguousarray(multiply(matrix, transforms).T)
+    samples += multiply(matrix, transforms).T
     return basis, samples
 
 

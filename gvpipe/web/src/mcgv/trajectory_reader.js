@@ -133,7 +133,7 @@ export class TrajectoryReader {
   }
 }
 
-/** The blend's matrix (P, 4K), to be placed for each segment; K; and S. */
+/** The blend's matrix (S, 4K), to be placed for each segment, K, and S. */
 function readBlend(kernels, data, { clusters }, { base, points }) {
   const weights = decodeWeights(kernels, data, points.causalNeighbours(), clusters);
   const coordinates = homogeneous(base);
