@@ -222,6 +222,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, 
     return {name: (paths[name], *result) for name, result in zip(paths, json.loads(printed), strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*BOMBS, *TABLES])
 def test_a_bomb_is_refused_cheaply(name: str, measured: dict[str, tuple[Path, str, int, float]]) -> None:
     path, error, memory, seconds = measured[name]

@@ -11,9 +11,12 @@ import pytest
 from folders import ROOT
 
 TOOLS = sorted((ROOT / "tools").glob("*.py"))
+SCRIPTS = [  # a process each; those that measure are left to the slow run
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem.startswith("measure_") else []) for path in TOOLS
+]
 
 
-@pytest.mark.parametrize("script", TOOLS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("script", SCRIPTS)
 def test_help(script: Path, tmp_path: Path) -> None:
     """It names the script and its first sentence, and nothing is measured or written."""
     done = subprocess.run([sys.executable, script, "--help"], capture_output=True, text=True, cwd=tmp_path)

@@ -57,7 +57,7 @@ def wheel(n_rim: int) -> Int32:
     return np.concatenate([np.stack([rim, after, one], axis=1), np.stack([after, rim, two], axis=1)]).astype(np.int32)
 
 
-@pytest.mark.parametrize("n_rim", [5, 30, BIG // 2, BIG, BIG + 1, 3 * BIG, 20 * BIG])
+@pytest.mark.parametrize("n_rim", [5, 30, BIG // 2, BIG, BIG + 1, 3 * BIG, pytest.param(20 * BIG, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", range(3))
 def test_triangles_come_and_go_in_order(n_rim: int, seed: int) -> None:
     """Rim vertices leave; some of their triangles come back elsewhere. Every list of corners is that of a list of its own."""

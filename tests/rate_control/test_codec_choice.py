@@ -182,7 +182,7 @@ def test_estimates_of_a_whole_sequence_count(target: dict[str, Any], tmp_path: P
     assert min(trial[measure] for trial in kept.tried) <= min(trial[measure] for trial in anew.tried)
 
 
-@pytest.mark.parametrize("bare", [False, True])
+@pytest.mark.parametrize("bare", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_sizes_are_those_of_the_layout_that_is_written(bare: bool, tmp_path: Path) -> None:
     report = gvpipe.encode(waving(8, 6), tmp_path / "a.mp4", "auto", bare=bare, max_error="1%")
     assert (tmp_path / "a.mp4").stat().st_size in {trial["bytes"] for trial in report.tried}
