@@ -16,6 +16,8 @@ import pytest
 from folders import DOCS, ROOT
 from sequences import waving
 
+import gvpipe
+
 pytestmark = pytest.mark.slow
 EVENTS = [
     "loadstart",
@@ -239,4 +241,24 @@ def test_the_live_page(built: Path, driver: Any) -> None:
         )
     assert shown[:2] == [2668, 102]
     assert shown[2].startswith("event pause") and "paused true" in shown[2]
-    assert f"{(DOCS / 'creature.mp4').stat().st_size / 1e3:.1f} kB" in (DOCS / "web.md").read_text("utf-8")
+    assert f"{(DOCS / 'gallery' / 'creature.mp4').stat().st_size / 1e3:.1f} kB" in (DOCS / "web.md").read_text("utf-8")
+
+
+def test_the_gallery(built: Path, driver: Any) -> None:
+    """All six players have their file and show a field where one is asked for; sizes on the page are those of the files."""
+    page = (DOCS / "gallery.md").read_text("utf-8")
+    files = sorted((DOCS / "gallery").glob("*.mp4"))
+    for path in files:
+        assert f"{path.stat().st_size / 1e3:.1f} kB" in page
+    with browsers.served(built) as address:
+        driver.get(f"{address}/gallery/")
+        shown = pages.run(
+            driver,
+            """const elements = [...document.querySelectorAll("geometry-video")];
+            const until = async (test) => { while (!test()) await new Promise((resolve) => setTimeout(resolve, 50)) };
+            await until(() => elements.every((each) => each.readyState === 4 || each.error));
+            return elements.map((each) => [each.getAttribute("src"), String(each.error), each.video.frameCount]);""",
+        )
+    assert len(shown) == 6 and {name for name, _, _ in shown} == {path.name for path in files}
+    for name, error, n_frames in shown:
+        assert error == "null" and n_frames == len(gvpipe.open(DOCS / "gallery" / name))
