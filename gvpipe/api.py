@@ -22,7 +22,7 @@ from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
 from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
 from gvpipe.foundation import notes
-from gvpipe.foundation.arguments import StrPath, check_path, show
+from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
@@ -317,12 +317,19 @@ def skin(
     Raises:
         InputError: the source cannot be read.
         SettingError: an argument out of range.
+        TypeError: an argument of the wrong type.
     """
     from gvpipe.skinning.fit import fit_skin
 
+    if isinstance(joints, bool) or not hasattr(joints, "__index__"):
+        raise TypeError(f"gvpipe.skin's joints is {show(joints)}; an integer is needed")
+    if target_kg is not None:
+        check_number(target_kg, "gvpipe.skin's target_kg")
+    if not isinstance(source, MeshSequence):
+        check_path(source, "gvpipe.skin's source", "a MeshSequence or ")
     sequence = source if isinstance(source, MeshSequence) else read(source)
     bound = None if max_error is None else parse_bound(max_error, sequence)
-    return fit_skin(sequence, joints, target_kg, bound, progress).skin
+    return fit_skin(sequence, int(joints), target_kg, bound, progress).skin
 
 
 def render(

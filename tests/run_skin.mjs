@@ -10,7 +10,8 @@ const { GLTFLoader } = await load("examples/jsm/loaders/GLTFLoader.js");
 
 const data = readFileSync(file);
 const bytes = data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength);
-const { scene, animations } = await new GLTFLoader().parseAsync(bytes, "");
+const { MeshoptDecoder } = await load("examples/jsm/libs/meshopt_decoder.module.js");
+const { scene, animations } = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, "");
 const mixer = new THREE.AnimationMixer(scene);
 animations.forEach((clip) => mixer.clipAction(clip).setLoop(THREE.LoopOnce).play());
 animations.forEach((clip) => (mixer.clipAction(clip).clampWhenFinished = true));

@@ -19,7 +19,7 @@ import click
 
 from gvpipe import __version__
 from gvpipe.cli.benchmarks import bench, plot
-from gvpipe.cli.console import Output, is_verbose, output_options, unlimited_option
+from gvpipe.cli.console import Output, compress_option, is_verbose, output_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
 from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_settings
@@ -207,6 +207,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
 @click.option("--skin/--no-skin", default=None, help="Of a .glb: a skeleton, or morph targets. [default: what is exact]")
+@compress_option
 @unlimited_option
 @output_options
 def decode(
@@ -220,6 +221,7 @@ def decode(
     lod: int,
     local: bool,
     skin: bool | None,
+    compress: str,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -232,13 +234,13 @@ def decode(
     from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
     from gvpipe.cli.choices import chosen, chosen_frames
-    from gvpipe.cli.skeletons import check_skin_options, skin_of_video
+    from gvpipe.cli.skeletons import check_glb_options, skin_of_video
     from gvpipe.foundation import notes
-    from gvpipe.io.writing import takes_skin
+    from gvpipe.io.writing import is_glb
     from gvpipe.playback import files
 
     out = out.carrying(target)
-    check_skin_options(target, skin is True)
+    check_glb_options(target, skin is True, compress)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given, unlimited=unlimited)
@@ -246,7 +248,7 @@ def decode(
         level = player.level(lod)
         sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
         found, said = skin_of_video(player, path, (start, stop), skin, is_whole=not parts and not lod)
-        noticed = [*said, *files.write(sequence.local() if local else sequence, path, start, found)]
+        noticed = [*said, *files.write(sequence.local() if local else sequence, path, start, found, compress)]
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
     noticed += [UNFINISHED] if player.bitstream.is_unfinished and UNFINISHED not in noticed else []
@@ -254,7 +256,7 @@ def decode(
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
-    values |= {"joints": found.joints if found else 0} if takes_skin(str(target)) else {}
+    values |= {"joints": found.joints if found else 0} if is_glb(str(target)) else {}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
     shape = notes.shape(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

@@ -97,6 +97,13 @@ class Output:
             logger.setLevel(level)
 
 
+compress_option = click.option(
+    "--compress",
+    type=click.Choice(["none", "meshopt"]),
+    default="none",
+    show_default=True,
+    help="Of a .glb: EXT_meshopt_compression, for a tenth to a half of the bytes.",
+)
 unlimited_option = click.option(
     "--unlimited",
     is_flag=True,

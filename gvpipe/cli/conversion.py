@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.cli.console import Output, output_options, unlimited_option
+from gvpipe.cli.console import Output, compress_option, output_options, unlimited_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import shape as shape_of
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 @click.option("--joints", type=int, default=0, help="Of the skeleton. [default: as many as the error takes, 256 at most]")
 @click.option("--target-kg", type=float, help="Largest KG error of the skeleton, percent. [default: 0.14]")
 @click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
+@compress_option
 @unlimited_option
 @output_options
 def convert(
@@ -54,6 +55,7 @@ def convert(
     joints: int,
     target_kg: float | None,
     max_error: str | None,
+    compress: str,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -63,14 +65,14 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
-    from gvpipe.cli.skeletons import check_skin_options, find_skin
-    from gvpipe.io.writing import takes_skin
+    from gvpipe.cli.skeletons import check_glb_options, find_skin, smaller_without
+    from gvpipe.io.writing import is_glb
     from gvpipe.playback import files
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
-    check_skin_options(target, skin, split, (joints, target_kg, max_error) != (0, None, None))
+    check_glb_options(target, skin, compress, split, (joints, target_kg, max_error) != (0, None, None))
     if split:
         if lod or start is not None or stop is not None or target == PIPE:
             raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
@@ -92,12 +94,13 @@ def convert(
             some = whole.part(start, stop)
         sequence = chosen(some, parts, None, "convert", progress)
         found, said = find_skin(sequence, joints, target_kg, max_error, progress) if skin else (None, [])
-        noticed = [*some.notes, *said, *files.write(sequence, path, start, found)]
+        noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
+        noticed += smaller_without(path, sequence) if found and compress == "none" else []
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
-    values |= {"joints": found.joints if found else 0} if takes_skin(target) else {}
+    values |= {"joints": found.joints if found else 0} if is_glb(target) else {}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

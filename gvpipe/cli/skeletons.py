@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 import click
 
-from gvpipe.foundation.errors import InputError
-from gvpipe.io.writing import takes_skin
+from gvpipe.foundation.errors import InputError, OverBudget
+from gvpipe.io.writing import is_glb
+from gvpipe.skinning.fit import ONE_FRAME
 
 if TYPE_CHECKING:
     from gvpipe.foundation.progress import Progress
@@ -33,11 +35,18 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
     Raises:
         InputError: it is wanted, and there is none.
     """
-    if wanted is False or (wanted is None and not (takes_skin(path) and is_whole and frames[1] - frames[0] > 1)):
+    if wanted is False or (wanted is None and not (is_glb(path) and is_whole and frames[1] - frames[0] > 1)):
         return None, []
     if not is_whole:
         raise InputError("--skin is for the whole mesh; leave out --part and --lod")
-    skin = player.skin()
+    if frames[1] - frames[0] < 2:
+        raise InputError(f"{player.path}: {ONE_FRAME}")
+    try:
+        skin = player.skin(*frames)
+    except OverBudget as exc:
+        if wanted:
+            raise
+        return None, [f"written with morph targets, since the skeleton is too large: {exc}"]
     if skin is None:
         if wanted:
             raise InputError(
@@ -49,14 +58,16 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
     if wanted is None and not skin.error <= EXACT:
         return None, [f"written with morph targets, since the file's skeleton is up to {off} off (--skin takes it)"]
     how = "exact" if skin.error <= EXACT else f"up to {off} off"
-    return skin.part(*frames), [f"written with a skeleton of {_joints(skin)}, {how}; --no-skin writes morph targets"]
+    return skin, [f"written with a skeleton of {_joints(skin)}, {how}; --no-skin writes morph targets"]
 
 
-def check_skin_options(target: str, is_wanted: bool, is_split: bool = False, others: bool = False) -> None:
-    """Raise `click.UsageError` for options of skeletons where none is written."""
+def check_glb_options(target: str, is_wanted: bool, compress: str, is_split: bool = False, others: bool = False) -> None:
+    """Raise `click.UsageError` for options of skeletons and of compression where there is none."""
+    if compress != "none" and (is_split or not is_glb(target)):
+        raise click.UsageError(f"--compress is for one .glb, without --split; OUTPUT is {target!r}")
     if others and not is_wanted:
         raise click.UsageError("--joints, --target-kg and --max-error are of --skin")
-    if is_wanted and (is_split or not takes_skin(target)):
+    if is_wanted and (is_split or not is_glb(target)):
         raise click.UsageError(f"--skin writes one .glb, without --split; OUTPUT is {target!r}")
 
 
@@ -75,6 +86,14 @@ def find_skin(
     if not is_met:
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
     return skin, said
+
+
+def smaller_without(path: str, sequence: MeshSequence) -> list[str]:
+    """A note where a file with a skeleton takes more bytes than one with morph targets would."""
+    targets = 12 * sequence.n_vertices * (sequence.n_frames - 1)  # what each frame adds to positions
+    if os.path.getsize(path) <= targets:
+        return []
+    return [f"morph targets would take about {targets / 1e3:.0f} kB beside the mesh; leave out --skin for these"]
 
 
 def _joints(skin: Skin) -> str:

@@ -77,3 +77,11 @@ class Skin:
     def part(self, start: int, stop: int) -> Skin:
         """Frames ``start`` to ``stop`` alone."""
         return replace(self, transforms=self.transforms[start:stop])
+
+
+def joint_means(skin: Skin, bind: Float32) -> Float64:
+    """``(J, 3)``: mean of the vertices ``bind (V, 3)`` that follow each joint, by their weights; 0 where none does."""
+    sums = np.zeros((skin.joints, 4))
+    points = np.concatenate([bind.astype(np.float64), np.ones((len(bind), 1))], axis=1)
+    np.add.at(sums, skin.indices, skin.weights[:, :, None] * points[:, None])
+    return np.asarray(sums[:, :3] / np.where(sums[:, 3:] > 0, sums[:, 3:], 1))

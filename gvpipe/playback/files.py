@@ -91,27 +91,32 @@ def read_runs(
     return find_runs(lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited), frames)
 
 
-def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | None = None) -> list[str]:
+def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | None = None, compress: str = "none") -> list[str]:
     """Write a mesh sequence as ``.npz``, or as frame files named by a pattern (``out/%04d.obj``), numbered from ``start``.
 
     With a ``skin`` of it (`gvpipe.skin`, `Player.skin`), a ``.glb`` has its skeleton in place of morph targets. Frames are
-    then as the skeleton moves them.
+    then as the skeleton moves them. With ``compress="meshopt"`` a ``.glb`` is compressed (EXT_meshopt_compression): positions
+    have 16 bits, normals 8, keys what their error allows, and vertices and triangles another order.
 
     Returns notes: what the format cannot hold, a line each.
 
     Raises:
-        InputError: the path names no format that can be written.
+        InputError: the path names no format that can be written, or none that has a skeleton or a compression.
         OutputError: a file cannot be written; nothing half-written is left.
-        TypeError: the first argument is no sequence, or the second no path.
+        SettingError: a compression that is not known.
+        TypeError: the first argument is no sequence, the second no path, or the skin none.
     """
     from gvpipe.model.sequence import MeshSequence
+    from gvpipe.model.skin import Skin
 
     if not isinstance(sequence, MeshSequence):
         raise TypeError(f"gvpipe.write's sequence is {show(sequence)}; a MeshSequence is needed")
     check_path(path, "gvpipe.write's path")
+    if skin is not None and not isinstance(skin, Skin):
+        raise TypeError(f"gvpipe.write's skin is {show(skin)}; a Skin is needed, as of gvpipe.skin")
     from gvpipe.io.writing import write as write_sequence
 
-    return list(write_sequence(sequence, path, start, skin))
+    return list(write_sequence(sequence, path, start, skin, compress))
 
 
 def frame_range(video: Player | MeshSequence, start: int, stop: int | None) -> tuple[int, int]:

@@ -122,16 +122,26 @@ class Player:
         """Section ``asset`` of the file."""
         return self._asset.directory
 
-    def skin(self) -> Skin | None:
+    def skin(self, start: int = 0, stop: int | None = None) -> Skin | None:
         """The skeleton that moves the vertices, and how far it is from the frames; None: the file has none.
 
         Files of codec `mcgv` have one, as a rule; where pictures say more, its error is that of the motion alone.
+
+        Args:
+            start, stop: first frame, and the one after the last, as of a slice.
+
+        Raises:
+            InputError: there is no such frame.
+            OverBudget: it takes more memory than a file of this size may.
         """
         from gvpipe.skinning.fit import measured
 
         with in_file(self.path):
             skin = read_skin(self.bitstream)
-        return None if skin is None else measured(skin, self.sequence())[0]
+        first, last, _ = slice(start, stop).indices(len(self))
+        if first >= last:
+            raise InputError(f"{self.path} has {len(self)} frames; there are none from {start} to {stop}")
+        return None if skin is None else measured(skin.part(first, last), self.sequence().part(first, last))[0]
 
     def outline(self) -> Outline:
         """What `gvpipe.info` tells of the mesh, from what is decoded."""

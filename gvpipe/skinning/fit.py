@@ -17,22 +17,24 @@ import numpy as np
 
 from gvpipe.coding.quality_scale import quality_of
 from gvpipe.coding.registry import encode_sequence, make_codec, read_skin
-from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.arrays import Float32, Float64
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.foundation.progress import Progress, silent
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal, measure_errors
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.model.skin import INFLUENCES, Skin
+from gvpipe.model.skin import INFLUENCES, Skin, joint_means
 
 if TYPE_CHECKING:
     from scipy import sparse
 
+ONE_FRAME = "one frame needs no skeleton; write it without one"
 CODEC = "mcgv"  # whose files have a skeleton
 LOOSE = 1.35  # of the error, what the codec is asked for at first: fitting the transforms anew mends about as much
 MORE = (64, 128, 256)  # joints that are tried where those that the codec finds do not do
 MOST = 1024  # joints
 DEFAULT_KG = 0.14  # percent: that of quality 75
-RIDGE = 1e-7  # of a joint's energy, towards the joint of the frame before: what no vertex tells stays as it is
+SMALLEST = 1e-4  # of the diagonal: joints that are smaller count as so large
+RIDGE = 1e-8  # of a joint's energy, towards its motion alone: what no vertex tells follows that
 
 
 @dataclass(frozen=True)
@@ -88,10 +90,10 @@ def fit_skin(
         InputError: there is one frame, or a frame cannot be read.
         SettingError: a number of joints or an error out of range.
     """
-    if not 0 <= joints <= MOST or isinstance(joints, bool):
+    if not 0 <= joints <= MOST:
         raise SettingError(f"joints is {joints!r}; an integer in 1..{MOST} is needed, or 0 for as many as it takes")
     if sequence.n_frames < 2:
-        raise InputError(f"{sequence.name} has one frame, which needs no skeleton; write it without one")
+        raise InputError(f"{sequence.name}: {ONE_FRAME}")
     wanted = Wanted(DEFAULT_KG if kg is None and largest is None else kg, largest)
     best: Fitted | None = None
     for skin in _candidates(sequence, joints, wanted, progress or silent):
@@ -123,48 +125,66 @@ def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Pro
 
 
 def refit(skin: Skin, sequence: MeshSequence, report: Progress = silent) -> Skin:
-    """The same joints and weights, the first frame as the bind pose, and transforms that carry it to the frames best."""
+    """The same joints and weights, the first frame as the bind pose, and transforms that carry it to the frames best.
+
+    Each joint's unknowns are about the middle of what follows it, and in units of its size. What the vertices leave open is
+    drawn to what each joint would be alone: the affine motion of the vertices that follow it, by their weights.
+    """
     from scipy.linalg import cho_factor, cho_solve
 
     bind = sequence.read(0, 1)[0]
     diagonal = frame_diagonal(sequence) or 1.0
-    centre = (bind.min(axis=0).astype(np.float64) + bind.max(axis=0)) / 2
-    points = np.concatenate([(bind - centre) / diagonal, np.ones((len(bind), 1))], axis=1)
-    blend = _blend(skin, points)
+    frames = _joint_frames(skin, bind, diagonal)
+    blend, alone = _blend(skin, bind, frames)
     normal = (blend.T @ blend).toarray()
     energies = normal.diagonal().reshape(-1, 4).sum(axis=1)
-    ridge = np.repeat(RIDGE * energies + 1e-12 * max(float(energies.max()), 1.0), 4)
-    factored = cho_factor(normal + np.diag(ridge), lower=True)
+    ridge = RIDGE * energies + 1e-12 * max(float(energies.max()), 1.0)
+    factored = cho_factor(normal + np.diag(np.repeat(ridge, 4)), lower=True)
     transforms = np.tile(np.eye(4), (sequence.n_frames, skin.joints, 1, 1))
-    before = np.zeros((4 * skin.joints, 3))  # in units of the diagonal, of displacements
     for first, block in sequence.chunks():
         for k, frame in enumerate(block, first):
             moved = (frame.astype(np.float64) - bind) / diagonal
-            rows = cho_solve(factored, blend.T @ moved + ridge[:, None] * before)
-            before = rows
-            transforms[k, :, :3] += _to_model(rows.reshape(-1, 4, 3), centre, diagonal)
+            given = blend.T @ moved  # in units of the diagonal, of displacements
+            own = ridge[:, None, None] * (alone @ given.reshape(-1, 4, 3))
+            rows = cho_solve(factored, given + own.reshape(-1, 3))
+            transforms[k, :, :3] += diagonal * np.swapaxes(rows.reshape(-1, 4, 3), 1, 2) @ frames
         report("skin", (first + len(block)) / sequence.n_frames)
     return Skin(skin.indices, skin.weights, bind, transforms)
 
 
-def _blend(skin: Skin, points: Float64) -> sparse.csr_array:
-    """``(V, 4J)``: what a row of each joint's transform moves each vertex by."""
+def _joint_frames(skin: Skin, bind: Float32, diagonal: float) -> Float64:
+    """``(J, 4, 4)``: from model units to those of each joint: about its weighted mean, one standard deviation long."""
+    middle = joint_means(skin, bind)
+    squares = np.zeros((skin.joints, 2))
+    away = np.square(bind[:, None] - middle[skin.indices]).sum(axis=2)  # (V, 4)
+    np.add.at(squares, skin.indices, skin.weights[:, :, None] * np.stack([away, np.ones_like(away)], axis=2))
+    size = np.sqrt(squares[:, 0] / np.where(squares[:, 1] > 0, squares[:, 1], 1))
+    scale = 1 / np.maximum(size, SMALLEST * diagonal)
+    result = np.tile(np.eye(4), (skin.joints, 1, 1))
+    result[:, :3, :3] *= scale[:, None, None]
+    result[:, :3, 3] = -scale[:, None] * middle
+    return result
+
+
+def _blend(skin: Skin, bind: Float32, frames: Float64) -> tuple[sparse.csr_array, Float64]:
+    """``(V, 4J)``: what a row of each joint's transform moves each vertex by; and ``(J, 4, 4)``, see `refit`.
+
+    The latter makes a joint's rows, as if it were alone, from the sums of its vertices' displacements.
+    """
     from scipy import sparse
 
-    n = len(points)
+    n = len(bind)
+    points = np.concatenate([bind.astype(np.float64), np.ones((n, 1))], axis=1)
+    own = np.einsum("viab,vb->via", frames[skin.indices], points)
     columns = (4 * skin.indices[:, :, None] + np.arange(4)).reshape(n, 4 * INFLUENCES)
-    values = (skin.weights[:, :, None] * points[:, None, :]).reshape(n, 4 * INFLUENCES)
+    values = (skin.weights[:, :, None] * own).reshape(n, 4 * INFLUENCES)
     starts = np.arange(0, values.size + 1, 4 * INFLUENCES)
     made = sparse.csr_array((values.ravel(), columns.ravel(), starts), shape=(n, 4 * skin.joints))
     made.sum_duplicates()
-    return made
-
-
-def _to_model(rows: Float64, centre: Float64, diagonal: float) -> Float64:
-    """``(J, 3, 4)`` less identity, in model units, from ``rows (J, 4, 3)`` of points in a unit box around 0."""
-    linear = np.swapaxes(rows[:, :3], 1, 2)
-    shift = diagonal * rows[:, 3] - linear @ centre
-    return np.concatenate([linear, shift[:, :, None]], axis=2)
+    sums = np.zeros((skin.joints, 4, 4))
+    np.add.at(sums, skin.indices, skin.weights[:, :, None, None] * own[:, :, :, None] * own[:, :, None, :])
+    sums += 1e-6 * (np.trace(sums, axis1=1, axis2=2)[:, None, None] + 1e-12) * np.eye(4)
+    return made, np.asarray(np.linalg.inv(sums), np.float64)
 
 
 def measured(skin: Skin, sequence: MeshSequence) -> tuple[Skin, Errors]:

@@ -20,6 +20,7 @@ from sequences import rigid, waving
 import gvpipe
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.io.gltf.reader import read_poses
+from gvpipe.io.gltf.scene_writing import prepare
 from gvpipe.io.scene.affine_nodes import BETWEEN, factor, find_keys, matrices
 from gvpipe.model.skin import Skin
 
@@ -99,9 +100,11 @@ def test_keys_are_where_they_are_needed() -> None:
     indices = np.zeros((12, 4), np.int32)
     indices[:, 0] = np.arange(12) % 3
     weights = np.tile(np.array([1, 0, 0, 0], np.float32), (12, 1))
-    nodes, is_key = find_keys(Skin(indices, weights, bind, given))
-    assert is_key[[0, -1]].all() and np.allclose(matrices(nodes)[::4], given)
-    stands, even, wild = is_key.sum(axis=0)
+    keys = find_keys(Skin(indices, weights, bind, given))
+    shifts = np.tile(np.eye(4), (3, 1, 1))
+    shifts[:, :3, 3] = keys.pivots
+    assert keys.is_key[[0, -1]].all() and np.allclose(matrices(keys.nodes)[::4], given @ shifts)
+    stands, even, wild = keys.is_key.sum(axis=0)
     assert stands == 2 and even <= 33 < wild
 
 
@@ -124,13 +127,87 @@ def test_it_reads_back(written: tuple[Path, Any, float]) -> None:
     assert farthest(halves, (frames[1:] + frames[:-1]) / 2) < 3 * BETWEEN
 
 
-@pytest.mark.skipif(shutil.which("node") is None or not THREE.exists(), reason="no node, or no three.js; npm ci in gvpipe/web")
+def shown_by_three(path: Path, times: list[float]) -> Any:
+    """Positions ``(n, V, 3)`` at some times, in the order of the file."""
+    if shutil.which("node") is None or not THREE.exists():
+        pytest.skip("no node, or no three.js; npm ci in gvpipe/web")
+    command = ["node", str(ROOT / "tests" / "run_skin.mjs"), str(THREE), str(path), *map(str, times)]
+    found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    return np.array(found).reshape(len(times), -1, 3)
+
+
 def test_three_js_shows_the_same(written: tuple[Path, Any, float]) -> None:
     path, frames, fps = written
     shown = [0, 1, len(frames) // 2, len(frames) - 1]
-    command = ["node", str(ROOT / "tests" / "run_skin.mjs"), str(THREE), str(path), *(str(k / fps) for k in shown)]
-    found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
-    assert farthest(np.array(found).reshape(len(shown), -1, 3), frames[shown]) < 1e-5
+    assert farthest(shown_by_three(path, [k / fps for k in shown]), frames[shown]) < 1e-5
+
+
+@pytest.mark.parametrize("has_skin", [True, False])
+def test_compressed_files_show_the_same(has_skin: bool, tmp_path: Path) -> None:
+    """In fewer bytes, and in another order of vertices; a skeleton and morph targets alike."""
+    with gvpipe.open(RIGID) as video:
+        sequence, frames = video.sequence(), video[:]
+        skin = video.skin() if has_skin else None
+    gvpipe.write(sequence, tmp_path / "plain.glb", skin=skin)
+    gvpipe.write(sequence, tmp_path / "small.glb", skin=skin, compress="meshopt")
+    assert (tmp_path / "small.glb").stat().st_size < 0.8 * (tmp_path / "plain.glb").stat().st_size
+    sources = prepare(sequence, is_packed=True).split.sources
+    assert not np.array_equal(sources, np.arange(len(sources)))
+    read = gvpipe.read(tmp_path / "small.glb")
+    assert read.n_frames == len(frames) and len(read.faces) == len(sequence.faces)
+    assert farthest(read.read(0, len(frames)), frames[:, sources]) < 2e-5
+    shown = [0, 1, len(frames) // 2, len(frames) - 1]
+    assert farthest(shown_by_three(tmp_path / "small.glb", [k / video.fps for k in shown]), frames[shown][:, sources]) < 2e-5
+
+
+def test_coarse_skeletons_have_coarse_keys(tmp_path: Path) -> None:
+    """What is off by more may have fewer bits: the file is smaller, and hardly farther off."""
+    sequence = waving(12, 30)
+    skin = gvpipe.skin(sequence, joints=6)
+    assert skin.error > 1e-3
+    for compress in ("none", "meshopt"):
+        gvpipe.write(sequence, tmp_path / f"{compress}.glb", skin=skin, compress=compress)
+    assert (tmp_path / "meshopt.glb").stat().st_size < 0.8 * (tmp_path / "none.glb").stat().st_size
+    sources = prepare(sequence, is_packed=True).split.sources
+    own, found = skin.read(0, 30)[:, sources], gvpipe.read(tmp_path / "meshopt.glb").read(0, 30)
+    assert farthest(found, own) < 0.1 * skin.error
+
+
+def test_weights_and_positions_that_joints_pull_apart_stay_exact(tmp_path: Path) -> None:
+    """Two joints that go off by a thousand sizes in opposite directions: 16 bits of their weights would not do."""
+    sequence = rigid()
+    bind = sequence.read(0, 1)[0]
+    n = len(bind)
+    weights = np.zeros((n, 4), np.float32)
+    weights[:, 0] = np.float32(1 / 3)
+    weights[:, 1] = 1 - weights[:, 0]
+    indices = np.tile(np.array([0, 1, 0, 0], np.int32), (n, 1))
+    transforms = np.tile(np.eye(4), (sequence.n_frames, 2, 1, 1))
+    away = 1000.0 * diagonal(bind[None]) * np.linspace(0, 1, sequence.n_frames)
+    transforms[:, 0, 0, 3] = away / float(weights[0, 0])
+    transforms[:, 1, 0, 3] = -away / float(weights[0, 1])
+    skin = Skin(indices, weights, bind, transforms)
+    for compress in ("none", "meshopt"):
+        gvpipe.write(sequence, tmp_path / "a.glb", skin=skin, compress=compress)
+        sources = prepare(sequence, is_packed=compress != "none").split.sources
+        found = gvpipe.read(tmp_path / "a.glb").read(0, sequence.n_frames)
+        assert farthest(found, skin.read(0, sequence.n_frames)[:, sources]) < 2e-4  # float32 of a thousand sizes
+
+
+def test_compression_of_what_moves_not_and_of_other_files(tmp_path: Path, run: Any) -> None:
+    gvpipe.write(scene().part(0, 1), tmp_path / "still.glb", compress="meshopt")
+    assert gvpipe.read(tmp_path / "still.glb").n_frames == 1 and "animations" not in _tree(tmp_path / "still.glb")
+    with pytest.raises(InputError, match="one .glb"):
+        gvpipe.write(scene(), tmp_path / "a.usdc", compress="meshopt")
+    with pytest.raises(SettingError, match="'none' or 'meshopt'"):
+        gvpipe.write(scene(), tmp_path / "a.glb", compress="draco")
+    ended = run("decode", RIGID, tmp_path / "b.npz", "--compress", "meshopt")
+    assert ended.status == 2 and "--compress is for one .glb" in ended.err
+    assert run("decode", RIGID, tmp_path / "b.glb", "--compress", "meshopt").status == 0
+    gvpipe.write(waving(4, 5), tmp_path / "in.npz")
+    assert run("convert", tmp_path / "in.npz", tmp_path / "c.glb", "--skin", "--compress", "meshopt").status == 0
+    for name in ("b", "c"):
+        assert "EXT_meshopt_compression" in _tree(tmp_path / f"{name}.glb")["extensionsRequired"]
 
 
 def test_a_skeleton_is_found_for_a_sequence(tmp_path: Path) -> None:
@@ -175,9 +252,16 @@ def test_what_is_refused(tmp_path: Path) -> None:
         replace(skin, indices=skin.indices + np.int32(9 - skin.indices.max()) * (skin.indices == skin.indices.max()))
     with pytest.raises(InputError, match="of shapes"):
         replace(skin, weights=skin.weights[:, :3])
-    for joints in (-1, 1025, True):
+    for joints in (-1, 1025):
         with pytest.raises(SettingError, match="joints is"):
             gvpipe.skin(sequence, joints=joints)
+    wrong: Any = (True, "4", 4.0)
+    for joints in wrong:
+        with pytest.raises(TypeError, match="joints is"):
+            gvpipe.skin(sequence, joints=joints)
+    for call in (lambda: gvpipe.skin(wrong), lambda: gvpipe.write(sequence, tmp_path / "a.glb", skin=wrong)):
+        with pytest.raises(TypeError, match="is needed"):
+            call()
     for kg in (0.0, -1.0, float("nan")):
         with pytest.raises(SettingError, match="target KG is"):
             gvpipe.skin(sequence, target_kg=kg)
@@ -229,6 +313,12 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert run("convert", tmp_path / "in.npz", tmp_path / "g.usdc", "--skin").status == 2
     ended = run("convert", tmp_path / "in.npz", tmp_path / "g.glb", "--skin", "--frames", "0:1")
     assert ended.status == 1 and "one frame" in ended.err
+    ended = run("decode", RIGID, tmp_path / "g.glb", "--skin", "--frames", "3:4")
+    assert ended.status == 1 and "one frame" in ended.err and not (tmp_path / "g.glb").exists()
+    assert run("decode", RIGID, tmp_path / "h.glb", "--frames", "3:9").status == 0
+    assert gvpipe.read(tmp_path / "h.glb").n_frames == 6
+    ended = run("convert", tmp_path / "in.npz", tmp_path / "i.glb", "--skin", "--joints", "8", "--frames", "0:2")
+    assert ended.status == 0 and "leave out --skin" in ended.err
 
 
 def _tree(path: Path) -> dict[str, Any]:

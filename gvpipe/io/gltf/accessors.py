@@ -127,7 +127,7 @@ class Accessors:
         if not packed:
             return self.document.view(number)
         if number not in self._views:
-            from gvpipe.io.gltf.meshopt import decode_view
+            from gvpipe.io.gltf.meshopt.reading import decode_view
 
             self._views[number] = decode_view(self.document, packed, name)
         return self._views[number]

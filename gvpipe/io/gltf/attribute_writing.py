@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.foundation.arrays import Array
+from gvpipe.io.gltf.glb import Filtered
 
 EXACT = 1 << 24  # integers up to here are exact as float32
 
@@ -21,11 +22,18 @@ class GltfAttribute:
         name: such as ``"TEXCOORD_0"``.
         values: ``(W, C)``.
         normalized: whether its integers stand for fractions.
+        filtered: what a packed file holds in place of the values.
     """
 
     name: str
     values: Array
     normalized: bool = False
+    filtered: Filtered | None = None
+
+    def part(self, start: int, stop: int) -> GltfAttribute:
+        """Its rows ``start`` to ``stop``."""
+        filtered = self.filtered and Filtered(self.filtered.elements[start:stop], self.filtered.name)
+        return replace(self, values=self.values[start:stop], filtered=filtered)
 
 
 def name_attributes(attributes: Mapping[str, Attribute]) -> dict[str, str]:

@@ -2,6 +2,9 @@
 
 Bytes go to a stream as they come, so that a long animation needs no memory; the JSON, which stands before them in the file, is
 written last.
+
+A packed file has its views in meshopt's compression (`gvpipe.io.gltf.meshopt`). They lie in the file's buffer; a second one,
+which has no bytes, says where they are once decoded.
 """
 
 from __future__ import annotations
@@ -13,30 +16,46 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.arrays import Array, UInt8
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.document import BINARY_CHUNK, CHUNK, HEADER, JSON_CHUNK, MAGIC
 from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.meshopt.writing import encode_attributes, encode_triangles
 
+MESHOPT = "EXT_meshopt_compression"
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 IN_MEMORY = 64 << 20  # bytes of the buffer, beyond which it goes to a temporary file
 LONGEST = 2**32 - 1  # bytes of a GLB file
 
 
-class Glb:
-    """A file in the making. ``tree`` is its JSON, to which the caller adds meshes, nodes and what else there is."""
+class Filtered(NamedTuple):
+    """What a packed file has in place of values: the elements ``(n, bytes)`` that a filter of meshopt's turns into them."""
 
-    def __init__(self) -> None:
+    elements: UInt8
+    name: str
+
+
+class Glb:
+    """A file in the making. ``tree`` is its JSON, to which the caller adds meshes, nodes and what else there is.
+
+    Args:
+        is_packed: whether its views are compressed.
+    """
+
+    def __init__(self, is_packed: bool = False) -> None:
+        self.is_packed = is_packed
         self.tree: Json = {"asset": {"version": "2.0", "generator": "gvpipe"}, "accessors": [], "bufferViews": []}
         self._stream: IO[bytes] = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by `close`
         self._size = 0
+        self._unpacked = 0  # bytes of compressed views, once decoded
+        self._blocks: dict[tuple[str, int, str], list[tuple[int, UInt8]]] = {}  # accessors and bytes, by type and filter
 
     def append(self, kind: str, item: Json) -> int:
         """Add an object to one of the tree's lists, and return its number."""
@@ -52,34 +71,82 @@ class Glb:
 
     def view(self, data: bytes, target: int | None = None, stride: int | None = None) -> int:
         """Add bytes, aligned to 4, and return the number of their buffer view."""
-        item: Json = {"buffer": 0, "byteOffset": self._size, "byteLength": len(data)}
+        item: Json = {"buffer": 0, "byteOffset": self._put(data), "byteLength": len(data)}
         item |= {"byteStride": stride} if stride else {}
         item |= {"target": target} if target else {}
+        return self.append("bufferViews", item)
+
+    def _put(self, data: bytes) -> int:
+        start = self._size
         self._stream.write(data)
         self._stream.write(bytes(-len(data) % 4))
         self._size += len(data) + -len(data) % 4
-        return self.append("bufferViews", item)
+        return start
 
-    def array(self, values: Array, target: int | None = None, bounds: bool = False, normalized: bool = False) -> int:
-        """Add an array ``(n, C)``, C up to 4, and return the number of its accessor.
+    def array(
+        self,
+        values: Array,
+        target: int | None = None,
+        bounds: bool = False,
+        normalized: bool = False,
+        filtered: Filtered | None = None,
+    ) -> int:
+        """Add an array ``(n, C)``, C up to 4 or 16, and return the number of its accessor.
 
         Args:
             values: of a type in `COMPONENTS`.
             target: `VERTICES` (rows are padded to 4 bytes) or `INDICES`.
             bounds: whether to say its smallest and largest values.
             normalized: whether its integers stand for fractions.
+            filtered: what a packed file holds in their place; values are then only looked at for their type and bounds.
         """
-        rows = np.ascontiguousarray(values)
-        width = rows.shape[1] * rows.itemsize
-        stride = None
-        if target == VERTICES and width % 4:
-            stride = width + -width % 4
-            padded = np.zeros((len(rows), stride), np.uint8)
-            padded[:, :width] = rows.view(np.uint8).reshape(len(rows), width)
-            rows = padded
-        view = self.view(rows.tobytes(), target, stride)
+        rows = _bytes_of(values, 4 if target == VERTICES else 1)
+        stride = rows.shape[1] if target == VERTICES and rows.shape[1] != values.shape[1] * values.itemsize else None
+        if self.is_packed:
+            view = self._packed_view(rows, target, stride, filtered)
+        else:
+            view = self.view(rows.tobytes(), target, stride)
         item = self._accessor(values, bounds) | {"bufferView": view}
         return self.append("accessors", item | ({"normalized": True} if normalized else {}))
+
+    def _packed_view(self, rows: UInt8, target: int | None, stride: int | None, filtered: Filtered | None) -> int:
+        """Add a view of ``rows (n, bytes)`` in compressed form, or as it is where that is smaller."""
+        is_triangles = target == INDICES
+        if is_triangles:
+            packed = encode_triangles(rows.reshape(-1).view(f"<u{rows.shape[1]}"))
+        elif rows.shape[1] % 4 == 0:
+            packed = encode_attributes(rows if filtered is None else filtered.elements)
+        if (not is_triangles and rows.shape[1] % 4) or (filtered is None and len(packed) >= rows.size):
+            return self.view(rows.tobytes(), target, stride)
+        self.use(MESHOPT, is_required=True)
+        own: Json = {"buffer": 0, "byteOffset": self._put(packed), "byteLength": len(packed)}
+        own |= {"byteStride": rows.shape[1], "count": len(rows), "mode": "TRIANGLES" if is_triangles else "ATTRIBUTES"}
+        own |= {"filter": filtered.name} if filtered else {}
+        item: Json = {"buffer": 1, "byteOffset": self._unpacked, "byteLength": rows.size}
+        item |= {"byteStride": rows.shape[1]} if target == VERTICES else {}
+        item |= {"target": target} if target else {}
+        self._unpacked += rows.size + -rows.size % 4
+        return self.append("bufferViews", item | {"extensions": {MESHOPT: own}})
+
+    def block(self, values: Array, bounds: bool = False, normalized: bool = False, filtered: Filtered | None = None) -> int:
+        """As `array`, for the many small arrays of an animation: those of one type share a view."""
+        item = self._accessor(values, bounds) | ({"normalized": True} if normalized else {})
+        number = self.append("accessors", item)
+        rows = filtered.elements if filtered and self.is_packed else _bytes_of(values)
+        key = values.dtype.str, values.shape[1], filtered.name if filtered and self.is_packed else ""
+        self._blocks.setdefault(key, []).append((number, rows))
+        return number
+
+    def _end_blocks(self) -> None:
+        for (_, _, name), parts in self._blocks.items():
+            rows = np.concatenate([part for _, part in parts])
+            filtered = Filtered(rows, name) if name else None
+            view = self._packed_view(rows, None, None, filtered) if self.is_packed else self.view(rows.tobytes())
+            start = 0
+            for number, part in parts:
+                self.tree["accessors"][number] |= {"bufferView": view} | ({"byteOffset": start} if start else {})
+                start += part.size
+        self._blocks = {}
 
     def sparse(self, values: Array, rows: Array, shape: tuple[int, int], bounds: bool = False) -> int:
         """Add an array of zeros but for some rows ``(n, C)``, and return the number of its accessor.
@@ -106,6 +173,7 @@ class Glb:
 
     def write(self, file: IO[bytes]) -> None:
         """Write the whole file; raises `ValueError` if it were longer than a GLB can be."""
+        self._end_blocks()
         text = self._json()
         total = HEADER.size + 2 * CHUNK.size + len(text) + self._size
         if total > LONGEST:
@@ -127,7 +195,9 @@ class Glb:
         self._stream.close()
 
     def _json(self) -> bytes:
-        tree = {key: value for key, value in self.tree.items() if value} | {"buffers": [{"byteLength": self._size}]}
+        decoded: Json = {"byteLength": self._unpacked, "extensions": {MESHOPT: {"fallback": True}}}
+        buffers = [{"byteLength": self._size}, *([decoded] if self._unpacked else [])]
+        tree = {key: value for key, value in self.tree.items() if value} | {"buffers": buffers}
         text = json.dumps(tree, separators=(",", ":"), ensure_ascii=False).encode()
         return text + b" " * (-len(text) % 4)
 
@@ -139,14 +209,14 @@ class Glb:
 
 
 @contextmanager
-def glb_at(path: Path) -> Iterator[Glb]:
+def glb_at(path: Path, is_packed: bool = False) -> Iterator[Glb]:
     """A file in the making, which is at the path once the block ends without an error.
 
     Raises:
         InputError: it would be longer than a GLB can be.
         OutputError: the file cannot be written.
     """
-    glb = Glb()
+    glb = Glb(is_packed)
     try:
         yield glb
         with unnamed_path(path) as temporary, open(temporary, "wb") as file:
@@ -160,3 +230,10 @@ def glb_at(path: Path) -> Iterator[Glb]:
 
 def _component(dtype: Any) -> int:
     return COMPONENTS[np.dtype(dtype).str[1:]]
+
+
+def _bytes_of(values: Array, multiple: int = 1) -> UInt8:
+    """The bytes of rows ``(n, C)``, each filled up to a multiple of bytes."""
+    rows = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), values.shape[1] * values.itemsize)
+    missing = -rows.shape[1] % multiple
+    return np.pad(rows, ((0, 0), (0, missing))) if missing else rows

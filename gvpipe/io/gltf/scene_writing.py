@@ -20,7 +20,8 @@ from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.material_writing import write_materials
 from gvpipe.io.gltf.nodes import compose
 from gvpipe.io.gltf.normal_writing import NORMAL, SplitNormals, split_normals
-from gvpipe.io.gltf.split import Shape, Split, split_vertices
+from gvpipe.io.gltf.quantizing import EXTENSION, needs_extension, quantized, steps_of
+from gvpipe.io.gltf.split import Shape, Split, in_drawing_order, split_vertices
 from gvpipe.io.losses import lost_notes
 from gvpipe.model.sequence import MeshSequence
 
@@ -60,11 +61,17 @@ class Written:
     shape: Shape
 
 
-def prepare(sequence: MeshSequence, fields: tuple[str, ...] = ()) -> Prepared:
-    """Split vertices and convert attributes; ``fields`` are names of fields that are written, too."""
+def prepare(sequence: MeshSequence, fields: tuple[str, ...] = (), is_packed: bool = False) -> Prepared:
+    """Split vertices and convert attributes.
+
+    Args:
+        sequence: that is written.
+        fields: names of fields that are written, too.
+        is_packed: the file is compressed; vertices and triangles then have another order.
+    """
     if not len(sequence.faces):
         raise InputError(f"{sequence.name} has no triangles; glTF needs one, so write .npz or .ply")
-    split = split_vertices(sequence)
+    split = in_drawing_order(split_vertices(sequence)) if is_packed else split_vertices(sequence)
     names = {name: held for name, held in name_attributes(sequence.attributes).items() if name in split.attributes}
     made = {name: as_gltf(names[name], sequence.attributes[name].kind, split.attributes[name]) for name in names}
     attributes = {name: one for name, one in made.items() if one is not None}
@@ -86,24 +93,33 @@ def prepare(sequence: MeshSequence, fields: tuple[str, ...] = ()) -> Prepared:
 
 
 def write_scene(
-    glb: Glb, prepared: Prepared, positions: Float32, more: tuple[GltfAttribute, ...] = (), is_skinned: bool = False
+    glb: Glb,
+    prepared: Prepared,
+    positions: Array,
+    more: tuple[GltfAttribute, ...] = (),
+    is_skinned: bool = False,
+    step: float = 0.0,
 ) -> list[Written]:
     """Add the whole scene.
 
     Args:
         glb: the file.
         prepared: what all frames share.
-        positions: ``(W, 3)`` of the split vertices.
+        positions: ``(W, 3)`` of the split vertices; integers of a `Lattice`, or float32.
         more: attributes of this frame alone.
         is_skinned: joints place the meshes, whose nodes are then roots.
+        step: how far off packed positions may be; 0: not at all.
     """
     sequence = prepared.sequence
     write_materials(glb, sequence.materials, sequence.images, prepared.uv_sets)
     written: list[Written] = []
     roots: list[int] = []
     last_parent = ""
+    attributes = tuple(map(quantized, (*prepared.attributes, *more))) if glb.is_packed else (*prepared.attributes, *more)
+    if positions.dtype != np.float32 or (glb.is_packed and any(map(needs_extension, attributes))):
+        glb.use(EXTENSION, is_required=True)
     for shape in prepared.split.shapes:
-        mesh = _write_mesh(glb, shape, positions, (*prepared.attributes, *more))
+        mesh = _write_mesh(glb, shape, positions, attributes, step)
         node = glb.append("nodes", {"mesh": mesh} | ({"name": shape.name} if shape.name else {}))
         written.append(Written(node, mesh, shape))
         if is_skinned or not shape.parent:
@@ -122,11 +138,13 @@ def write_scene(
     return written
 
 
-def _write_mesh(glb: Glb, shape: Shape, positions: Float32, attributes: tuple[GltfAttribute, ...]) -> int:
-    span = slice(shape.start, shape.stop)
-    accessors = {"POSITION": glb.array(positions[span], VERTICES, bounds=True)}
+def _write_mesh(glb: Glb, shape: Shape, positions: Array, attributes: tuple[GltfAttribute, ...], step: float) -> int:
+    own_positions = positions[shape.start : shape.stop]
+    filtered = steps_of(own_positions, step) if step and glb.is_packed else None
+    accessors = {"POSITION": glb.array(own_positions, VERTICES, bounds=True, filtered=filtered)}
     for one in attributes:
-        accessors[one.name] = glb.array(one.values[span], VERTICES, normalized=one.normalized)
+        own = one.part(shape.start, shape.stop)
+        accessors[one.name] = glb.array(own.values, VERTICES, normalized=own.normalized, filtered=own.filtered)
     primitives = []
     for faces, material in shape.primitives:
         small = shape.stop - shape.start < 65536  # the largest number of a type is no vertex

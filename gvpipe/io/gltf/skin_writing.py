@@ -1,8 +1,10 @@
 """Sequences as GLB with a skeleton: the bind pose once, and keys of the joints.
 
 A joint's motion is affine. It is two nodes (`gvpipe.io.scene.affine_nodes`), so that it is exact in every engine that
-multiplies matrices down the tree. Inverse bind matrices are the identity. The meshes are roots, as glTF wants skinned ones; one
-node above all joints turns and scales the scene.
+multiplies matrices down the tree. Inverse bind matrices take positions to the joints' pivots. The meshes are roots, as glTF
+wants skinned ones; one node above all joints turns and scales the scene.
+
+A packed file has positions of 16 bits, whose lattice the inverse bind matrices undo, and keys as fine as they need to be.
 
 Source: Khronos, glTF 2.0 specification, sections 3.7.3 (skins) and 3.11 (animations).
 """
@@ -14,12 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Bool, Float32, Int64, UInt16
+from gvpipe.foundation.arrays import Array, Bool, Float32, Float64, Int64, UInt16
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
-from gvpipe.io.gltf.glb import Glb, glb_at
+from gvpipe.io.gltf.glb import Filtered, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.meshopt.writing import pack_quaternions
+from gvpipe.io.gltf.quantizing import Lattice, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
 from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
 from gvpipe.model.sequence import MeshSequence
@@ -29,24 +33,29 @@ FULL = 65535  # a weight of 1
 MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
 STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
 TURNED_NORMALS = ("normals of the first frame turn with the skeleton; those of later frames are left out",)
+QUATERNION_BITS, LEAST_BITS = 16, 4
+EXACT = 5e-6  # of the diagonal: what rounding may add where a skin is exact
+COMPARED = 16  # frames
+ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
 NO_PARENTS = ("skinned meshes have no nodes above them; names of the parts' parents are left out",)
 
 
-def write_skinned(sequence: MeshSequence, skin: Skin, path: Path) -> tuple[str, ...]:
+def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: bool = False) -> tuple[str, ...]:
     """Write a sequence as the skin moves it; return what the file cannot hold, a line each.
 
     Args:
         sequence: its triangles, attributes, parts and materials.
         skin: of its vertices, and of as many frames.
         path: of the ``.glb``.
+        is_packed: compressed, by EXT_meshopt_compression and KHR_mesh_quantization.
 
     Raises:
         InputError: the skin is not the sequence's, it has too many joints, or the file would be longer than a GLB can be.
         OutputError: the file cannot be written.
     """
     check_skin(sequence, skin, path)
-    prepared = prepare(sequence)
-    with glb_at(path) as glb:
+    prepared = prepare(sequence, is_packed=is_packed)
+    with glb_at(path, is_packed) as glb:
         _write(glb, prepared, skin)
     parents = any(shape.parent for shape in prepared.split.shapes)
     own = prepared.normals is not None and prepared.normals.is_field
@@ -67,21 +76,46 @@ def check_skin(sequence: MeshSequence, skin: Skin, path: Path) -> None:
 
 def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     sources = prepared.split.sources
+    keys = find_keys(skin)
+    limit = max(keys.precision, EXACT * float(np.linalg.norm(np.ptp(skin.bind, axis=0))))
+    rounded = replace(skin, weights=(_as_fractions(skin.weights) / FULL).astype(np.float32))
+    is_near = _farthest(skin, rounded) <= limit
+    weights = _as_fractions(skin.weights[sources]) if is_near else skin.weights[sources]
     joints = skin.indices[sources].astype(np.uint8 if skin.joints <= 256 else np.uint16)
-    influences = GltfAttribute("JOINTS_0", joints), GltfAttribute("WEIGHTS_0", _as_fractions(skin.weights[sources]), True)
+    influences = GltfAttribute("JOINTS_0", joints), GltfAttribute("WEIGHTS_0", weights, is_near)
     normals = normals_of(prepared, 0, prepared.sequence.read(0, 1)[0])
     if normals is not None:
         normals = replace(normals, values=_to_bind(skin, sources, normals.values))
     shown = influences if normals is None else (normals, *influences)
-    written = write_scene(glb, prepared, skin.bind[sources], shown, is_skinned=True)
+    lattice = Lattice.around(skin.bind) if glb.is_packed else None
+    if lattice is not None and _farthest(skin, replace(skin, bind=lattice.positions(skin.bind))) > limit:
+        lattice = None
+    positions: Array = skin.bind[sources] if lattice is None else lattice.integers(skin.bind[sources])
+    written = write_scene(glb, prepared, positions, shown, is_skinned=True)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
-    keys = find_keys(skin)
     numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
     root = glb.append("nodes", {"name": "skeleton", "children": [outer for outer, _ in numbers], **prepared.place})
-    glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root})
+    inverse = glb.array(_inverse_binds(keys.pivots, lattice))
+    glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root, "inverseBindMatrices": inverse})
     glb.tree["scenes"][0]["nodes"].append(root)
     _write_keys(glb, prepared.sequence, keys, numbers, float(np.ptp(skin.bind, axis=0).max()))
+
+
+def _farthest(skin: Skin, other: Skin) -> float:
+    """How far apart vertices of two skins of the same joints are, at most, in some of the frames.
+
+    Weights and positions in fewer bits are near where joints are, and far where joints part.
+    """
+    frames = np.unique(np.linspace(0, skin.n_frames - 1, COMPARED).astype(int))
+    return max(float(np.linalg.norm(skin.evaluate(k) - other.evaluate(k), axis=1).max(initial=0)) for k in frames)
+
+
+def _inverse_binds(pivots: Float64, lattice: Lattice | None) -> Float32:
+    """``(J, 16)``, each by columns: from the file's positions to those about each joint's pivot."""
+    result = np.tile(np.eye(4) if lattice is None else lattice.matrix(), (len(pivots), 1, 1))
+    result[:, :3, 3] -= pivots
+    return np.swapaxes(result, 1, 2).reshape(-1, 16).astype(np.float32)
 
 
 def _to_bind(skin: Skin, sources: Int64, normals: Array) -> Float32:
@@ -118,30 +152,46 @@ def _write_keys(glb: Glb, sequence: MeshSequence, keys: Keys, numbers: list[tupl
     channels: list[Json] = []
     known: dict[bytes, int] = {}  # times are written once for all joints that share them
 
-    def add(node: int, path: str, is_key: Bool, values: Array) -> None:
+    def add(node: int, path: str, is_key: Bool, values: Float64, step: float) -> None:
         shown = is_key.tobytes()
         if shown not in known:
-            known[shown] = glb.array(times[is_key], bounds=True)
+            known[shown] = glb.block(times[is_key], bounds=True)
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
-        output = glb.array(values[is_key].astype(np.float32))
-        samplers.append({"input": known[shown], "output": output, "interpolation": "LINEAR"})
+        write = _write_rotations if path == "rotation" else _write_vectors
+        samplers.append({"input": known[shown], "output": write(glb, values[is_key], step)})  # LINEAR, as by default
 
     for j, (outer, inner) in enumerate(numbers):
-        for node, path, values, tolerance in (
-            (outer, "translation", keys.nodes.translations[:, j], STANDS * extent),
-            (outer, "rotation", keys.nodes.rotations[:, j], STANDS),
-            (outer, "scale", keys.nodes.scales[:, j], STANDS),
-            (inner, "rotation", keys.nodes.inner[:, j], STANDS),
+        reach = max(float(keys.reach[j]), STANDS * extent)
+        scaled = keys.precision / reach
+        turned = scaled / max(1.0, float(np.abs(keys.nodes.scales[:, j]).max()))  # an angle
+        for node, path, values, tolerance, step in (
+            (outer, "translation", keys.nodes.translations[:, j], STANDS * extent, keys.precision),
+            (outer, "rotation", keys.nodes.rotations[:, j], STANDS, turned),
+            (outer, "scale", keys.nodes.scales[:, j], STANDS, scaled),
+            (inner, "rotation", keys.nodes.inner[:, j], STANDS, turned),
         ):
             if moves(values, tolerance):
-                add(node, path, keys.is_key[:, j], values)
+                add(node, path, keys.is_key[:, j], values, step)
     if not channels:
-        add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0])
+        add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0], keys.precision)
     name = sequence.metadata.texts.get("clip") or "animation"
     glb.append("animations", {"name": name, "samplers": samplers, "channels": channels, "extras": {FPS: sequence.fps}})
 
 
+def _write_vectors(glb: Glb, values: Float64, step: float) -> int:
+    """Add translations or scales ``(n, 3)``, within a step where the file is packed."""
+    return glb.block(values.astype(np.float32), filtered=steps_of(values, step) if glb.is_packed else None)
+
+
+def _write_rotations(glb: Glb, values: Float64, angle: float) -> int:
+    """Add quaternions ``(n, 4)``, within an angle: as integers of 16 bits where these hold it."""
+    bits = int(np.ceil(np.log2(ANGLE / angle))) + 1
+    if bits > QUATERNION_BITS:
+        return glb.block(values.astype(np.float32))
+    filtered = Filtered(pack_quaternions(values, max(bits, LEAST_BITS)), "QUATERNION") if glb.is_packed else None
+    return glb.block(np.rint(32767 * values).astype(np.int16), normalized=True, filtered=filtered)
+
+
 def _plain(values: Array) -> list[float]:
-    """Numbers as the keys have them, so that the rest pose is the first frame."""
-    result: list[float] = values.astype(np.float32).astype(np.float64).tolist()
-    return result
+    """Numbers as float32 has them, in few digits; the rest pose is the first frame."""
+    return [float(str(each)) for each in values.astype(np.float32)]

@@ -6,13 +6,15 @@ other, so that the order of vertices stays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.part import Part
 from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.mesh.drawing_order import first_uses, order_triangles
 from gvpipe.model.sequence import MeshSequence
 
 
@@ -38,7 +40,7 @@ class Split:
     """A sequence's vertices, split.
 
     Args:
-        sources: ``(W,)`` the sequence's vertex of each, rising.
+        sources: ``(W,)`` the sequence's vertex of each; rising, but in the order of drawing.
         corners: ``(W,)`` a triangle corner that each is at, -1 for none; None where no corner attribute splits vertices.
         attributes: arrays ``(W, C)`` by name, of those per vertex and per corner.
         shapes: the meshes.
@@ -78,6 +80,35 @@ def split_vertices(sequence: MeshSequence) -> Split:
             values[first < 0] = 0
             arrays[name] = values
     return Split(sources, first, arrays, _shapes(sequence, sources, index.reshape(-1, 3)))
+
+
+def in_drawing_order(split: Split) -> Split:
+    """The same, with each mesh's triangles and vertices in the order of `gvpipe.mesh.drawing_order`.
+
+    Vertices of meshes that share some of theirs keep their order.
+    """
+    order = np.arange(len(split.sources))
+    places = order.copy()
+    spans = sorted({(shape.start, shape.stop) for shape in split.shapes})
+    is_apart = all(one[1] <= two[0] for one, two in pairwise(spans))
+    known: set[int] = set()
+    shapes = []
+    for shape in split.shapes:
+        span = slice(shape.start, shape.stop)
+        primitives = [(faces[order_triangles(faces)], material) for faces, material in shape.primitives]
+        if is_apart and shape.start not in known:
+            known.add(shape.start)
+            uses = first_uses(np.concatenate([faces for faces, _ in primitives]), shape.stop - shape.start)
+            order[span] = shape.start + uses
+            places[order[span]] = np.arange(shape.start, shape.stop)
+        own = (places[span] - shape.start).astype(np.int32)
+        shapes.append(replace(shape, primitives=tuple((own[faces], material) for faces, material in primitives)))
+    return Split(
+        split.sources[order],
+        None if split.corners is None else split.corners[order],
+        {name: values[order] for name, values in split.attributes.items()},
+        tuple(shapes),
+    )
 
 
 def _value_rows(one: Attribute) -> Int64:

@@ -19,12 +19,15 @@ from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import VERTICES, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.normal_writing import NORMAL
+from gvpipe.io.gltf.quantizing import steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, normals_of, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.model.sequence import MeshSequence
 
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
 ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much
+EXACT = 5e-6  # of the diagonal: how far off positions of packed files may be
+NORMAL_STEP = 1 / 256  # of what targets of packed files add to normals
 SMALL_INTEGERS = ("float32", "int8", "uint8", "int16", "uint16")
 
 
@@ -51,15 +54,20 @@ def encode_glb(sequence: MeshSequence, shared: str) -> FrameEncoder:
     return FrameEncoder(encode, fields, prepared.notes)
 
 
-def write_animated(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
-    """Write a sequence as one animated GLB; return what it cannot hold, a line each.
+def write_animated(sequence: MeshSequence, path: Path, is_packed: bool = False) -> tuple[str, ...]:
+    """Write a sequence as one animated GLB, or one frame as a still one; return what it cannot hold, a line each.
+
+    Args:
+        sequence: to be written.
+        path: of the ``.glb``.
+        is_packed: compressed by EXT_meshopt_compression, positions within `EXACT`.
 
     Raises:
         InputError: it would be longer than a GLB can be.
         OutputError: the file cannot be written.
     """
-    prepared = prepare(sequence)
-    with glb_at(path) as glb:
+    prepared = prepare(sequence, is_packed=is_packed)
+    with glb_at(path, is_packed) as glb:
         n_targets = _write_animation(glb, prepared)
     return (*prepared.notes, *_animation_notes(n_targets))
 
@@ -70,9 +78,11 @@ class _Targets:
 
     Args:
         written: the mesh.
+        step: of positions, where they are packed.
     """
 
     written: Written
+    step: float
     accessors: list[dict[str, int]] = field(default_factory=list)
     frames: list[int] = field(default_factory=list)
     known: dict[bytes, int] = field(default_factory=dict)
@@ -86,17 +96,19 @@ class _Targets:
         digest = hashlib.sha256(b"".join(values.tobytes() for values in own.values())).digest()
         if digest not in self.known:
             self.known[digest] = len(self.accessors)
-            self.accessors.append({name: _write_deltas(glb, values, name == "POSITION") for name, values in own.items()})
+            self.accessors.append({name: _write_deltas(glb, values, name, self.step) for name, values in own.items()})
         self.frames.append(self.known[digest])
 
 
-def _write_deltas(glb: Glb, deltas: Float32, bounds: bool) -> int:
+def _write_deltas(glb: Glb, deltas: Float32, name: str, step: float) -> int:
     """Add what a target adds ``(n, 3)``, without its zeros if that is smaller, and return the number of its accessor."""
+    bounds = name == "POSITION"
     moved = np.flatnonzero(deltas.any(axis=1))
     index_size = 2 if len(deltas) <= 65536 else 4
-    if len(moved) * (index_size + 12) < 12 * len(deltas):
+    if not glb.is_packed and len(moved) * (index_size + 12) < 12 * len(deltas):
         return glb.sparse(deltas[moved], moved, (len(deltas), 3), bounds=bounds)
-    return glb.array(deltas, VERTICES, bounds=bounds)
+    filtered = steps_of(deltas, step if bounds else NORMAL_STEP) if glb.is_packed else None
+    return glb.array(deltas, VERTICES, bounds=bounds, filtered=filtered)
 
 
 def _write_animation(glb: Glb, prepared: Prepared) -> int:
@@ -104,7 +116,11 @@ def _write_animation(glb: Glb, prepared: Prepared) -> int:
     sequence, sources = prepared.sequence, prepared.split.sources
     first = sequence.read(0, 1)[0]
     base, normals = first[sources], normals_of(prepared, 0, first)
-    targets = [_Targets(one) for one in write_scene(glb, prepared, base, () if normals is None else (normals,))]
+    step = EXACT * (float(np.linalg.norm(np.ptp(first, axis=0))) or 1.0)
+    scene = write_scene(glb, prepared, base, () if normals is None else (normals,), step=step)
+    if sequence.n_frames == 1:
+        return 0
+    targets = [_Targets(one, step) for one in scene]
     for start, block in sequence.chunks():
         for i, frame in enumerate(block):
             deltas = {"POSITION": frame[sources] - base}

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Bool, Float64, Int64
-from gvpipe.model.skin import Skin
+from gvpipe.model.skin import Skin, joint_means
 
+BLOCK = 32  # joints that are looked at together; what that takes is many times their matrices
 PER_FRAME = 4  # moments from a frame to the next: a power of two
 COARSEST = 32 * PER_FRAME  # moments of the longest span between keys
 AT_FRAMES, BETWEEN = 4e-6, 1e-3  # of the diagonal: how far off a joint may be, at frames and between them
@@ -47,27 +48,49 @@ class Keys(NamedTuple):
     """When each joint has a key.
 
     Args:
-        nodes: at all moments, `PER_FRAME` of them from each frame to the next.
+        nodes: at all moments, `PER_FRAME` of them from each frame to the next; they move points relative to the pivots.
         is_key: ``(G, J)``; the first and the last moment always are.
+        pivots: ``(J, 3)``: the middle of what follows each joint, so that a turn about it moves little else.
+        reach: ``(J,)``: how far from its pivot a vertex that follows a joint is, at most.
+        precision: how far off a joint may be at frames, as a distance.
     """
 
     nodes: AffineNodes
     is_key: Bool
+    pivots: Float64
+    reach: Float64
+    precision: float
 
 
 def find_keys(skin: Skin) -> Keys:
-    """The nodes and keys of a skin's joints: few where players find what lies between, more where they would not.
+    """The nodes and keys of a skin's joints: few where players find what lies between, more where they would not."""
+    pivots = joint_means(skin, skin.bind).astype(np.float32).astype(np.float64)  # which files hold
+    diagonal = float(np.linalg.norm(np.ptp(skin.bind, axis=0)))
+    at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
+    corners = _corners(skin, pivots)
+    tolerances = diagonal * at_frames, diagonal * max(BETWEEN, at_frames)
+    found = []
+    for first in range(0, skin.joints, BLOCK):
+        own = slice(first, first + BLOCK)
+        moments = _between_frames(skin.transforms[:, own] @ _shifts(pivots[own]))
+        nodes = factor(moments)
+        found.append((nodes, _choose(nodes, moments, corners[own], tolerances)))
+    nodes = AffineNodes(*(np.concatenate(parts, axis=1) for parts in zip(*(one for one, _ in found), strict=True)))
+    is_key = np.concatenate([one for _, one in found], axis=1)
+    reach = np.linalg.norm(corners[:, :, :3], axis=2).max(axis=1)
+    return Keys(nodes, is_key, pivots, reach, tolerances[0])
+
+
+def _choose(nodes: AffineNodes, moments: Float64, corners: Float64, tolerances: tuple[float, float]) -> Bool:
+    """``(G, J)``: where joints have keys; ``tolerances`` are distances at frames and between them.
 
     Spans of `COARSEST` moments are halved, for each joint by itself, until it is near enough at all moments inside.
     """
-    moments = _between_frames(skin.transforms)
-    nodes, corners = factor(moments), _corners(skin)
-    diagonal = float(np.linalg.norm(np.ptp(skin.bind, axis=0)))
-    at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
-    steps = _farthest(skin.transforms[1:] - skin.transforms[:-1], corners)  # (F - 1, J) from a frame to the next
-    allowed = np.full(moments.shape[:2], diagonal * at_frames)
+    frames = moments[::PER_FRAME]
+    steps = _farthest(frames[1:] - frames[:-1], corners)  # (F - 1, J) from a frame to the next
+    allowed = np.full(moments.shape[:2], tolerances[0])
     for k in range(1, PER_FRAME):
-        allowed[k::PER_FRAME] = np.maximum(diagonal * max(BETWEEN, at_frames), OF_STEP * steps)
+        allowed[k::PER_FRAME] = np.maximum(tolerances[1], OF_STEP * steps)
     last = len(moments) - 1
     is_key = np.zeros(moments.shape[:2], bool)
     is_key[::COARSEST] = is_key[-1] = True
@@ -75,7 +98,7 @@ def find_keys(skin: Skin) -> Keys:
     while step > 1:
         starts = np.arange(0, last, step)
         stops = np.minimum(starts + step, last)
-        is_far = np.zeros((len(starts), skin.joints), bool)
+        is_far = np.zeros((len(starts), moments.shape[1]), bool)
         for offset in range(1, step):
             at = np.minimum(starts + offset, stops)
             guess = matrices(_between(nodes, starts, stops, (at - starts) / (stops - starts)))
@@ -84,7 +107,14 @@ def find_keys(skin: Skin) -> Keys:
         middles = np.minimum(starts + step // 2, stops)
         is_key[middles] |= is_far
         step //= 2
-    return Keys(nodes, is_key)
+    return is_key
+
+
+def _shifts(pivots: Float64) -> Float64:
+    """``(J, 4, 4)`` that take the origin to the pivots."""
+    result = np.tile(np.eye(4), (len(pivots), 1, 1))
+    result[:, :3, 3] = pivots
+    return result
 
 
 def _farthest(differences: Float64, corners: Float64) -> Float64:
@@ -104,15 +134,15 @@ def _between_frames(transforms: Float64) -> Float64:
     return result
 
 
-def _corners(skin: Skin) -> Float64:
-    """``(J, 8, 4)``: corners of the box around the vertices that follow each joint, with a 1."""
+def _corners(skin: Skin, pivots: Float64) -> Float64:
+    """``(J, 8, 4)``: corners of the box around the vertices that follow each joint, relative to its pivot, with a 1."""
     low, high = np.full((skin.joints, 3), np.inf), np.full((skin.joints, 3), -np.inf)
     vertices, column = np.nonzero(skin.weights)
     joints = skin.indices[vertices, column]
     np.minimum.at(low, joints, skin.bind[vertices])
     np.maximum.at(high, joints, skin.bind[vertices])
     is_used = np.isfinite(low[:, :1])
-    box = np.stack([np.where(is_used, low, 0), np.where(is_used, high, 0)])  # (2, J, 3)
+    box = np.stack([np.where(is_used, low - pivots, 0), np.where(is_used, high - pivots, 0)])  # (2, J, 3)
     return np.stack(
         [np.stack([*(box[choice[axis], :, axis] for axis in range(3)), np.ones(skin.joints)], axis=1)
          for choice in product((0, 1), repeat=3)],

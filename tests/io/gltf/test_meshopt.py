@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 import gvpipe
 from gvpipe.foundation.errors import InputError
-from gvpipe.io.gltf.meshopt import decode_attributes, decode_indices, decode_triangles
-from gvpipe.io.gltf.meshopt_filters import colors, floats, quaternions, unit_vectors
+from gvpipe.io.gltf.meshopt.filters import colors, floats, quaternions, unit_vectors
+from gvpipe.io.gltf.meshopt.reading import decode_attributes, decode_indices, decode_triangles
 
 Bytes = NDArray[np.uint8]
 

@@ -19,7 +19,7 @@ from gvpipe.container.segments import segment_starts
 from gvpipe.foundation.arrays import Float32, Float64
 from gvpipe.model.skin import INFLUENCES, Skin
 
-BYTES_PER_JOINT, SECONDS_PER_JOINT = 256, 1e-6  # of a frame
+BYTES_PER_JOINT, SECONDS_PER_JOINT = 1024, 1e-6  # of a frame; keys take most of it
 
 
 def read_skin(bitstream: Bitstream) -> Skin | None:

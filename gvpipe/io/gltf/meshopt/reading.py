@@ -14,7 +14,7 @@ import numpy as np
 from gvpipe.foundation.arrays import Array, UInt8
 from gvpipe.io.gltf.document import Document
 from gvpipe.io.gltf.json_fields import Json, integer, text
-from gvpipe.io.gltf.meshopt_filters import FILTERS
+from gvpipe.io.gltf.meshopt.filters import FILTERS
 
 ATTRIBUTES_HEADER, TRIANGLES_HEADER, INDICES_HEADER = 0xA0, 0xE0, 0xD0  # high four bits; the low ones are the version
 LEAST_TAIL = (32, 24)  # bytes after the attributes, by version
@@ -57,7 +57,7 @@ def decode_view(document: Document, packed: Json, name: str) -> memoryview:
 
 def decode_attributes(data: UInt8, count: int, stride: int) -> UInt8:
     """Elements ``(count, stride)`` of an attributes stream; raises `ValueError`."""
-    from gvpipe.io.gltf.meshopt_kernels import read_deltas
+    from gvpipe.io.gltf.meshopt.reading_kernels import read_deltas
 
     version = int(data[0]) - ATTRIBUTES_HEADER
     if version not in (0, 1) or stride % 4:
@@ -98,7 +98,7 @@ def _sum_deltas(deltas: UInt8, first: UInt8, channel: int) -> UInt8:
 
 def decode_triangles(data: UInt8, count: int) -> Array:
     """Corners ``(count,)`` of a triangles stream; raises `ValueError`."""
-    from gvpipe.io.gltf.meshopt_kernels import read_triangles
+    from gvpipe.io.gltf.meshopt.reading_kernels import read_triangles
 
     version = int(data[0]) - TRIANGLES_HEADER
     if version not in (0, 1) or count % 3:
@@ -115,7 +115,7 @@ def decode_triangles(data: UInt8, count: int) -> Array:
 
 def decode_indices(data: UInt8, count: int) -> Array:
     """Indices ``(count,)`` of an index stream; raises `ValueError`."""
-    from gvpipe.io.gltf.meshopt_kernels import read_indices
+    from gvpipe.io.gltf.meshopt.reading_kernels import read_indices
 
     version = int(data[0]) - INDICES_HEADER
     if version not in (0, 1):

@@ -1,6 +1,6 @@
 """Filters of meshopt's compression: what the decoded integers of an element stand for.
 
-Source: as of `gvpipe.io.gltf.meshopt`.
+Source: as of `gvpipe.io.gltf.meshopt.reading`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Loops of meshopt's decoder; `meshopt` describes the streams. Every read is checked: -1 means that the data ends early."""
+"""Loops of meshopt's decoder; `reading` describes the streams. Every read is checked: -1 means that the data ends early."""
 
 from __future__ import annotations
 
