@@ -236,7 +236,7 @@ def decode(
     from gvpipe.cli.choices import chosen, chosen_frames
     from gvpipe.cli.skeletons import check_glb_options, skin_of_video
     from gvpipe.foundation import notes
-    from gvpipe.io.writing import is_glb
+    from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
@@ -256,7 +256,7 @@ def decode(
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
-    values |= {"joints": found.joints if found else 0} if is_glb(str(target)) else {}
+    values |= {"joints": found.joints if found else 0} if takes_skin(str(target)) else {}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
     shape = notes.shape(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

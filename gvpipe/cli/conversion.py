@@ -66,7 +66,7 @@ def convert(
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
     from gvpipe.cli.skeletons import check_glb_options, find_skin, smaller_without
-    from gvpipe.io.writing import is_glb
+    from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
@@ -100,7 +100,7 @@ def convert(
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
-    values |= {"joints": found.joints if found else 0} if is_glb(target) else {}
+    values |= {"joints": found.joints if found else 0} if takes_skin(target) else {}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

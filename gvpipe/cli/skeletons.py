@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gvpipe.foundation.errors import InputError, OverBudget
-from gvpipe.io.writing import is_glb
+from gvpipe.io.writing import is_glb, takes_skin
 from gvpipe.skinning.fit import ONE_FRAME
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ def check_glb_options(target: str, is_wanted: bool, compress: str, is_split: boo
         raise click.UsageError(f"--compress is for one .glb, without --split; OUTPUT is {target!r}")
     if others and not is_wanted:
         raise click.UsageError("--joints, --target-kg and --max-error are of --skin")
-    if is_wanted and (is_split or not is_glb(target)):
-        raise click.UsageError(f"--skin writes one .glb, without --split; OUTPUT is {target!r}")
+    if is_wanted and (is_split or not takes_skin(target)):
+        raise click.UsageError(f"--skin writes one .glb or USD file, without --split; OUTPUT is {target!r}")
 
 
 def find_skin(

@@ -10,6 +10,9 @@ from gvpipe.model.sequence import MeshSequence
 
 LISTED = 5  # names in a note
 
+NO_PARENTS = "skinned meshes have no nodes above them; names of the parts' parents are left out"
+TURNED_NORMALS = "normals of the first frame turn with the skeleton; those of later frames are left out"
+
 
 def lost_notes(sequence: MeshSequence, format_name: str, held: Collection[str], more: Sequence[str] = ()) -> tuple[str, ...]:
     """A note of what a sequence has and a format does not hold.

@@ -12,18 +12,38 @@ from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames.pattern import match_pattern
 from gvpipe.io.frames.writer import write_frames
 from gvpipe.io.late import late
-from gvpipe.io.scene_formats import OPENVAT, WRITERS
+from gvpipe.io.scene_formats import OPENVAT, USD, WRITERS
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
 SKIN_WRITER = late("gltf", "write_skinned")
+USD_SKIN_WRITER = late("usd.writer", "write_usd")
 GLB_WRITER = late("gltf", "write_animated")
 COMPRESSIONS = ("none", "meshopt")
 
 
 def is_glb(path: str) -> bool:
-    """Whether a path is of one .glb, which may have a skeleton and be compressed."""
-    return Path(path).suffix.lower() == ".glb" and match_pattern(path) is None and not os.path.isdir(path)
+    """Whether a path is of one .glb, which may be compressed."""
+    return _is_one(path, (".glb",))
+
+
+def takes_skin(path: str) -> bool:
+    """Whether a path is of one file that may have a skeleton."""
+    return _is_one(path, (".glb", *USD))
+
+
+def _is_one(path: str, suffixes: tuple[str, ...]) -> bool:
+    return Path(path).suffix.lower() in suffixes and match_pattern(path) is None and not os.path.isdir(path)
+
+
+def check_skin(sequence: MeshSequence, skin: Skin, path: str) -> None:
+    """Raise `InputError` unless a skin is of a sequence's vertices and frames."""
+    shape = (sequence.n_frames, sequence.n_vertices)
+    if (skin.n_frames, len(skin.bind)) != shape:
+        raise InputError(
+            f"{path}: the skin has {skin.n_frames} frames of {len(skin.bind)} vertices, the sequence {shape[0]} of {shape[1]}; "
+            f"give the skin that was made of it"
+        )
 
 
 def write(
@@ -36,7 +56,7 @@ def write(
             (``.pc2``, ``.mdd``, ``.npy``), a folder of vertex animation textures (``.openvat``), a pattern of frame files
             (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
         start: number of the first frame file.
-        skin: of the sequence, for a ``.glb``: its skeleton is written in place of morph targets.
+        skin: of the sequence, for a ``.glb`` or USD: its skeleton is written in place of morph targets or sampled points.
         compress: ``"meshopt"``: a ``.glb`` in fewer bytes, by EXT_meshopt_compression; or ``"none"``.
 
     Raises:
@@ -49,10 +69,14 @@ def write(
     if compress not in COMPRESSIONS:
         raise SettingError(f"compress is {show(compress)}; {' or '.join(map(repr, COMPRESSIONS))} is needed")
     is_packed = compress != "none"
-    if (skin is not None or is_packed) and not is_glb(path):
-        what, option = ("a skeleton", "skin") if skin is not None else ("a compressed file", "compression")
-        raise InputError(f"{path}: {what} is written as one .glb; give such a name, or leave the {option} out")
+    if is_packed and not is_glb(path):
+        raise InputError(f"{path}: a compressed file is one .glb; give such a name, or leave the compression out")
     if skin is not None:
+        if not takes_skin(path):
+            raise InputError(f"{path}: a skeleton is written as one .glb or USD file; give such a name, or leave the skin out")
+        check_skin(sequence, skin, path)
+        if not is_glb(path):
+            return tuple(USD_SKIN_WRITER(sequence, Path(path), skin))
         return tuple(SKIN_WRITER(sequence, skin, Path(path), is_packed))
     if is_packed:
         return tuple(GLB_WRITER(sequence, Path(path), is_packed))

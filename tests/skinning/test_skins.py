@@ -239,11 +239,41 @@ def test_all_else_travels(tmp_path: Path) -> None:
     assert farthest(found.read(0, found.n_frames), plain.read(0, plain.n_frames)) < 3 * skin.error + 1e-5
 
 
+@pytest.mark.parametrize("suffix", [".usdc", ".usda", ".usdz"])
+def test_usd_has_the_skeleton(suffix: str, tmp_path: Path) -> None:
+    """USD's own library plays it as the skin does, but for its half-float scales; all else is as without a skeleton."""
+    pytest.importorskip("pxr")
+    sequence = replace(scene(), origin=np.array([1000.0, -20.0, 3.0]))
+    skin = gvpipe.skin(sequence)
+    gvpipe.write(sequence, tmp_path / f"plain{suffix}")
+    gvpipe.write(sequence, tmp_path / f"skin{suffix}", skin=skin)
+    plain, found = gvpipe.read(tmp_path / f"plain{suffix}"), gvpipe.read(tmp_path / f"skin{suffix}")
+    assert (found.n_frames, found.fps) == (plain.n_frames, plain.fps) and found.not_carried == ()
+    assert [part.name for part in found.parts] == [part.name for part in plain.parts] and not any(
+        part.parent for part in found.parts
+    )
+    assert found.materials == plain.materials and np.array_equal(found.faces, plain.faces)
+    absolute = skin.read(0, sequence.n_frames) + sequence.origin
+    assert farthest(found.read(0, found.n_frames) + found.origin, absolute) < 3e-4
+
+
+def test_usd_of_a_video_turns_no_wrong_normals(tmp_path: Path, run: Any) -> None:
+    """A file's bind pose is no frame, so its normals are left out, and a note says so."""
+    pytest.importorskip("pxr")
+    ended = run("decode", RIGID, tmp_path / "a.usdc", "--skin", "--json")
+    assert json.loads(ended.out)["joints"] >= 1
+    with gvpipe.open(RIGID) as video:
+        assert farthest(gvpipe.read(tmp_path / "a.usdc").read(0, len(video)), video[:]) < 1e-4
+    assert json.loads(run("decode", RIGID, tmp_path / "b.usdc", "--json").out)["joints"] == 0  # by default what is exact
+    later = gvpipe.write(scene().part(4, 10), tmp_path / "c.usdc", skin=gvpipe.skin(scene()).part(4, 10))
+    assert any("normals are left out" in note for note in later)
+
+
 def test_what_is_refused(tmp_path: Path) -> None:
     sequence = waving(4, 5)
     skin = gvpipe.skin(sequence, joints=2)
-    with pytest.raises(InputError, match="one .glb"):
-        gvpipe.write(sequence, tmp_path / "a.usdc", skin=skin)
+    with pytest.raises(InputError, match="one .glb or USD"):
+        gvpipe.write(sequence, tmp_path / "a.abc", skin=skin)
     with pytest.raises(InputError, match="one .glb"):
         gvpipe.write(sequence, tmp_path / "%d.glb", skin=skin)
     with pytest.raises(InputError, match="5 frames of 16 vertices, the sequence 4 of 16"):
@@ -310,7 +340,7 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     ended = run("convert", tmp_path / "in.npz", tmp_path / "f.glb", "--skin", "--target-kg", "0.05", "--json")
     assert json.loads(ended.out)["joints"] >= 2 and "a skeleton of" in ended.err
     assert run("convert", tmp_path / "in.npz", tmp_path / "g.glb", "--joints", "4").status == 2
-    assert run("convert", tmp_path / "in.npz", tmp_path / "g.usdc", "--skin").status == 2
+    assert run("convert", tmp_path / "in.npz", tmp_path / "g.abc", "--skin").status == 2
     ended = run("convert", tmp_path / "in.npz", tmp_path / "g.glb", "--skin", "--frames", "0:1")
     assert ended.status == 1 and "one frame" in ended.err
     ended = run("decode", RIGID, tmp_path / "g.glb", "--skin", "--frames", "3:4")

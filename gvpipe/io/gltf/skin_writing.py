@@ -25,6 +25,7 @@ from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.meshopt.writing import pack_quaternions
 from gvpipe.io.gltf.quantizing import Lattice, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
+from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
 from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
@@ -32,12 +33,10 @@ from gvpipe.model.skin import Skin
 FULL = 65535  # a weight of 1
 MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
 STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
-TURNED_NORMALS = ("normals of the first frame turn with the skeleton; those of later frames are left out",)
 QUATERNION_BITS, LEAST_BITS = 16, 4
 EXACT = 5e-6  # of the diagonal: what rounding may add where a skin is exact
 COMPARED = 16  # frames
 ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
-NO_PARENTS = ("skinned meshes have no nodes above them; names of the parts' parents are left out",)
 
 
 def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: bool = False) -> tuple[str, ...]:
@@ -50,28 +49,17 @@ def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: boo
         is_packed: compressed, by EXT_meshopt_compression and KHR_mesh_quantization.
 
     Raises:
-        InputError: the skin is not the sequence's, it has too many joints, or the file would be longer than a GLB can be.
+        InputError: the skin has too many joints, or the file would be longer than a GLB can be.
         OutputError: the file cannot be written.
     """
-    check_skin(sequence, skin, path)
+    if skin.joints > MAX_JOINTS:
+        raise InputError(f"{path}: {skin.joints} joints; glTF holds {MAX_JOINTS}, so make the skin with fewer")
     prepared = prepare(sequence, is_packed=is_packed)
     with glb_at(path, is_packed) as glb:
         _write(glb, prepared, skin)
     parents = any(shape.parent for shape in prepared.split.shapes)
     own = prepared.normals is not None and prepared.normals.is_field
-    return (*prepared.notes, *(NO_PARENTS if parents else ()), *(TURNED_NORMALS if own else ()))
-
-
-def check_skin(sequence: MeshSequence, skin: Skin, path: Path) -> None:
-    """Raise `InputError` unless a skin is of a sequence's vertices and frames, and a file can hold its joints."""
-    shape = (sequence.n_frames, sequence.n_vertices)
-    if (skin.n_frames, len(skin.bind)) != shape:
-        raise InputError(
-            f"{path}: the skin has {skin.n_frames} frames of {len(skin.bind)} vertices, the sequence {shape[0]} of {shape[1]}; "
-            f"give the skin that was made of it"
-        )
-    if skin.joints > MAX_JOINTS:
-        raise InputError(f"{path}: {skin.joints} joints; glTF holds {MAX_JOINTS}, so make the skin with fewer")
+    return (*prepared.notes, *((NO_PARENTS,) if parents else ()), *((TURNED_NORMALS,) if own else ()))
 
 
 def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:

@@ -64,7 +64,7 @@ class Keys(NamedTuple):
 
 def find_keys(skin: Skin) -> Keys:
     """The nodes and keys of a skin's joints: few where players find what lies between, more where they would not."""
-    pivots = joint_means(skin, skin.bind).astype(np.float32).astype(np.float64)  # which files hold
+    pivots = joint_pivots(skin)
     diagonal = float(np.linalg.norm(np.ptp(skin.bind, axis=0)))
     at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
     corners = _corners(skin, pivots)
@@ -72,7 +72,7 @@ def find_keys(skin: Skin) -> Keys:
     found = []
     for first in range(0, skin.joints, BLOCK):
         own = slice(first, first + BLOCK)
-        moments = _between_frames(skin.transforms[:, own] @ _shifts(pivots[own]))
+        moments = _between_frames(moved_to(skin.transforms[:, own], pivots[own]))
         nodes = factor(moments)
         found.append((nodes, _choose(nodes, moments, corners[own], tolerances)))
     nodes = AffineNodes(*(np.concatenate(parts, axis=1) for parts in zip(*(one for one, _ in found), strict=True)))
@@ -110,11 +110,16 @@ def _choose(nodes: AffineNodes, moments: Float64, corners: Float64, tolerances: 
     return is_key
 
 
-def _shifts(pivots: Float64) -> Float64:
-    """``(J, 4, 4)`` that take the origin to the pivots."""
-    result = np.tile(np.eye(4), (len(pivots), 1, 1))
-    result[:, :3, 3] = pivots
-    return result
+def joint_pivots(skin: Skin) -> Float64:
+    """``(J, 3)``: the middle of what follows each joint, as float32 has it."""
+    return joint_means(skin, skin.bind).astype(np.float32).astype(np.float64)
+
+
+def moved_to(transforms: Float64, pivots: Float64) -> Float64:
+    """``transforms (F, J, 4, 4)`` of points relative to ``pivots (J, 3)``, rather than to the origin."""
+    shifts = np.tile(np.eye(4), (len(pivots), 1, 1))
+    shifts[:, :3, 3] = pivots
+    return np.asarray(transforms @ shifts)
 
 
 def _farthest(differences: Float64, corners: Float64) -> Float64:

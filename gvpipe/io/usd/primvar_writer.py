@@ -80,8 +80,8 @@ def write_field(name: str, field: Field, meshes: list[tuple[Any, ExportMesh]], s
                 _write(drawn, name, layer, layer.values, start + first + i)
 
 
-def write_normals(drawn: Any, layer: Layer, time: float) -> None:
-    """Write normals at a time code; where they are indexed, the indices are those of every time."""
+def write_normals(drawn: Any, layer: Layer, time: float | None) -> None:
+    """Write normals at a time code, None for all times; where they are indexed, the indices are those of every time."""
     _write(drawn, "normals", layer, layer.values, time)
 
 

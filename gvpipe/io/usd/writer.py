@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +18,25 @@ from gvpipe.foundation.arrays import Float32
 from gvpipe.foundation.atomic import atomic_path, temporary_folder, unnamed_path
 from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.io.damage import reason_of
-from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
+from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS, renamed_note, shadow_note, shadowed, unit_note
 from gvpipe.io.scene.export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene.normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
 from gvpipe.io.usd.primvar_writer import primvar_names, write_field, write_normals, write_primvars
 from gvpipe.io.usd.signature import EXTRA
+from gvpipe.io.usd.skin_writer import is_first_frame, write_skeleton
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import Skin
 
 ROOT = "root"  # of meshes that have no common node
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
 
-def write_usd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+def write_usd(sequence: MeshSequence, path: Path, skin: Skin | None = None) -> tuple[str, ...]:
     """Write a sequence as .usda, .usdc, .usd (binary) or .usdz; returns what the format cannot hold.
 
+    With a skin of it, the motion is a UsdSkel skeleton (`skin_writer`) in place of points that are sampled.
     Textures go into the folder ``NAME_textures`` beside the file, or into the .usdz.
 
     Raises:
@@ -45,17 +49,17 @@ def write_usd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         raise InputError(f"{path}: {EXTRA}") from exc
     try:
         if path.suffix.lower() == ".usdz":
-            return _write_package(sequence, path)
+            return _write_package(sequence, path, skin)
         with atomic_path(path) as temporary:
             folder = path.with_name(f"{path.stem}_textures")
-            said = _write_stage(sequence, temporary, path.stem, folder.name)
+            said = _write_stage(sequence, temporary, path.stem, folder.name, skin)
         _write_images(sequence, folder)
     except (Tf.ErrorException, RuntimeError) as exc:
         raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
     return said
 
 
-def _write_package(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tuple[str, ...]:
     """A .usdz: a binary stage first, then its textures, neither compressed."""
     from pxr import Sdf, Usd
 
@@ -63,7 +67,7 @@ def _write_package(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     with temporary_folder() as held:
         folder = Path(held)
         stage = folder / "scene.usdc"
-        said = _write_stage(sequence, stage, path.stem, "textures")
+        said = _write_stage(sequence, stage, path.stem, "textures", skin)
         _write_images(sequence, folder / "textures")
         with atomic_path(path) as temporary:
             package = folder / "package.usdz"
@@ -77,8 +81,8 @@ def _write_package(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     return said
 
 
-def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -> tuple[str, ...]:
-    from pxr import UsdGeom
+def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None) -> tuple[str, ...]:
+    from pxr import Gf, UsdGeom, UsdSkel
 
     stage: Any = _new_stage(path)
     about = sequence.metadata
@@ -90,9 +94,12 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     UsdGeom.SetStageUpAxis(stage, about.up_axis.upper() if about.up_axis in ("y", "z") else "Y")
     UsdGeom.SetStageMetersPerUnit(stage, about.metres_per_unit or 1.0)
     meshes = export_meshes(sequence, name)
+    has_parents = skin is not None and any(mesh.parent for mesh in meshes)
+    if has_parents:  # USD moves no mesh that lies below another one by a skeleton
+        meshes = [replace(mesh, parent="") for mesh in meshes]
     paths = _paths(meshes)
     root = paths[0].split("/")[1]
-    top = UsdGeom.Xform.Define(stage, f"/{root}").GetPrim()
+    top = (UsdGeom.Xform if skin is None else UsdSkel.Root).Define(stage, f"/{root}").GetPrim()
     stage.SetDefaultPrim(top)
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
@@ -103,6 +110,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     usual = {name: one for name, one in names.items() if one not in ("st", "normals", "displayColor")}
     own = {name: one for name, one in usual.items() if not (name.startswith("uv") and one == f"st{name[2:]}")}
     said = [
+        *([NO_PARENTS] if has_parents else []),
         *normals.notes,
         *shadow_note(shadowed(sequence), "USD"),
         *renamed_note(own.items(), "USD"),
@@ -111,12 +119,18 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str) -
     drawn = [_define(stage, where, mesh, sequence, materials) for where, mesh in zip(paths, meshes, strict=True)]
     for each, mesh in zip(drawn, meshes, strict=True):
         said.extend(write_primvars(each, mesh, attributes, names))
-    _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
+    if skin is None:
+        _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
+    else:
+        write_skeleton(stage, f"/{root}", skin, list(zip(drawn, meshes, strict=True)), start)
+        said += _write_bind_normals(sequence, list(zip(drawn, meshes, strict=True)), normals, is_first_frame(skin))
+        if sequence.origin.any():
+            UsdGeom.Xformable(top).AddTranslateOp().Set(Gf.Vec3d(*sequence.origin.tolist()))
     for field_name, field in normals.fields.items():
         write_field(names[field_name], field, list(zip(drawn, meshes, strict=True)), start)
     stage.GetRootLayer().Save()
     parts = [(mesh.name, where.rpartition("/")[2]) for where, mesh in zip(paths, meshes, strict=True)]
-    return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes))
+    return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes, skin is not None))
 
 
 def _first_code(start_time: float, fps: float) -> float:
@@ -145,7 +159,7 @@ def _define(stage: Any, where: str, mesh: ExportMesh, sequence: MeshSequence, ma
     for name, shown in zip(names, [*names[: len(names) - len(given)], *given], strict=True):
         parent += f"/{name}"
         if parent == f"/{names[0]}" or not stage.GetPrimAtPath(parent):
-            name_prim(UsdGeom.Xform.Define(stage, parent).GetPrim(), shown)
+            name_prim(stage.GetPrimAtPath(parent) or UsdGeom.Xform.Define(stage, parent).GetPrim(), shown)
     drawn = UsdGeom.Mesh.Define(stage, where)
     name_prim(drawn.GetPrim(), mesh.name)
     drawn.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -177,6 +191,20 @@ def _write_frames(sequence: MeshSequence, meshes: list[tuple[Any, ExportMesh]], 
                 writer.write(first + i, np.ascontiguousarray(whole[slice(*mesh.vertices)]))
                 if turned is not None:
                     write_normals(drawn, normals.layer(turned, mesh, own), start + first + i)
+
+
+def _write_bind_normals(
+    sequence: MeshSequence, meshes: list[tuple[Any, ExportMesh]], normals: SceneNormals, is_first: bool
+) -> list[str]:
+    """Write normals of the bind pose, if it is the first frame; returns notes."""
+    turned = normals.of(0, sequence.read(0, 1)[0])
+    if turned is None:
+        return []
+    if not is_first:
+        return ["normals are left out, since the skeleton's bind pose is not the first frame"]
+    for drawn, mesh in meshes:
+        write_normals(drawn, normals.layer(turned, mesh, normals.rows(mesh)), None)
+    return [TURNED_NORMALS]
 
 
 class PointsWriter:
@@ -254,12 +282,12 @@ def _write_images(sequence: MeshSequence, folder: Path) -> None:
             temporary.write_bytes(image.data)
 
 
-def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
+def _notes(sequence: MeshSequence, meshes: list[ExportMesh], has_skin: bool) -> tuple[str, ...]:
     said = [] if sequence.metadata.metres_per_unit else ["the length of a unit is unknown; the stage says 1 metre"]
     lost = uncovered(sequence, meshes)
     if lost:
         said.append(f"{lost} vertices belong to no part; USD holds meshes alone, so they were left out")
-    if sequence.origin.any():
+    if sequence.origin.any() and not has_skin:
         said.append(f"USD holds float32 points; the origin {notes.show_origin(sequence.origin)} was added to them")
     if sequence.metadata.up_axis == "x":
         said.append("USD has no X-up stages; the stage says Y up, and positions are as they were")
