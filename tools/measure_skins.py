@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 import gvpipe
-from gvpipe.io.gltf.scene_writing import prepare
+from gvpipe.foundation.arrays import Float32
+from gvpipe.io.gltf.scene_writing import prepare, world_matrix
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
 
@@ -74,11 +75,17 @@ FILES = {"mp4": "a.mp4", "morph": "morph.glb", "skin": "skin.glb", "compressed":
 
 
 def kg_of(path: Path, sequence: MeshSequence) -> float | None:
-    """Karni and Gotsman's error of a compressed file, percent, whose vertices have an order of their own."""
+    """Karni and Gotsman's error of a compressed file, percent; its vertices have another order, and its scene may be turned."""
     read, sources = gvpipe.read(path), prepare(sequence, is_packed=True).split.sources
     rows = np.empty(sequence.n_vertices, np.int64)
     rows[sources] = np.arange(len(sources))
-    return measure_errors(sequence, lambda start, stop: read.read(start, stop)[:, rows]).kg
+    to_source = np.linalg.inv(world_matrix(sequence.metadata)).T
+
+    def shown(start: int, stop: int) -> Float32:
+        absolute = read.read(start, stop)[:, rows].astype(np.float64) + read.origin
+        return (absolute @ to_source - sequence.origin).astype(np.float32)
+
+    return measure_errors(sequence, shown).kg
 
 
 def shown(row: dict[str, Any]) -> str:
