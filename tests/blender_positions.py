@@ -29,7 +29,9 @@ def main(file: str, target: str, n_frames: int, fps: float) -> None:
     else:
         bpy.ops.wm.usd_import(filepath=file)
         first = scene.frame_start
-    meshes = sorted((each for each in scene.objects if each.type == "MESH"), key=lambda each: str(each.name))
+    shapes = bpy.data.collections.get("glTF_not_exported")  # what Blender draws bones with
+    drawn = [each for each in scene.objects if each.type == "MESH" and not (shapes and each.name in shapes.objects)]
+    meshes = sorted(drawn, key=lambda each: str(each.name))
     frames = []
     for frame in range(n_frames):
         scene.frame_set(first + frame)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from asset_scene import scene
-from folders import DATA
+from folders import DATA, GOLDEN
 
 import gvpipe
 
@@ -46,6 +46,18 @@ def test_blender_has_every_position(tmp_path: Path, source: str, suffix: str) ->
     assert len(found["materials"]) == len(drawn)
     assert len(found["pictures"]) == (0 if suffix == "abc" else len(sequence.images))
     assert len(found["uv"]) == sum(each.kind == "uv" for each in sequence.attributes.values())
+
+
+@pytest.mark.parametrize("suffix", ["glb", "usdc"])
+def test_blender_moves_skeletons(tmp_path: Path, suffix: str) -> None:
+    with gvpipe.open(GOLDEN / "mcgv-1-rigid.mp4") as video:
+        sequence, skin = video.sequence(), video.skin()
+    gvpipe.write(sequence, tmp_path / f"a.{suffix}", skin=skin)
+    found = by_blender(tmp_path / f"a.{suffix}", sequence.fps)["positions"]
+    expected = sequence.read(0, N_FRAMES)[:, :, [0, 2, 1]] * [1, -1, 1]
+    assert found.shape == expected.shape
+    bound = 1e-5 if suffix == "glb" else 1e-4  # USD has scales as half floats
+    assert np.linalg.norm(found - expected, axis=2).max() < bound * np.linalg.norm(np.ptp(expected[0], axis=0))
 
 
 def by_blender(path: Path, fps: float) -> Any:

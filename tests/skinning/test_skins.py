@@ -26,6 +26,7 @@ from gvpipe.model.skin import Skin
 
 RIGID = GOLDEN / "mcgv-1-rigid.mp4"  # without pictures; has frames that repeat, and vertices that stand still
 THREE = ROOT / "gvpipe" / "web" / "node_modules" / "three"
+BABYLON = ROOT / "tests" / "web" / "npm" / "node_modules"
 
 
 def diagonal(frames: Any) -> float:
@@ -127,23 +128,30 @@ def test_it_reads_back(written: tuple[Path, Any, float]) -> None:
     assert farthest(halves, (frames[1:] + frames[:-1]) / 2) < 3 * BETWEEN
 
 
-def shown_by_three(path: Path, times: list[float]) -> Any:
+ENGINES = {"three.js": ("run_skin.mjs", THREE), "Babylon.js": ("run_babylon.mjs", BABYLON)}
+each_engine = pytest.mark.parametrize("engine", ENGINES)
+
+
+def shown_by(engine: str, path: Path, times: list[float]) -> Any:
     """Positions ``(n, V, 3)`` at some times, in the order of the file."""
-    if shutil.which("node") is None or not THREE.exists():
-        pytest.skip("no node, or no three.js; npm ci in gvpipe/web")
-    command = ["node", str(ROOT / "tests" / "run_skin.mjs"), str(THREE), str(path), *map(str, times)]
+    script, packages = ENGINES[engine]
+    if shutil.which("node") is None or not (packages if engine == "three.js" else packages / "@babylonjs" / "loaders").exists():
+        pytest.skip(f"no node, or no {engine}; npm ci in gvpipe/web and tests/web/npm")
+    command = ["node", str(ROOT / "tests" / script), str(packages), str(path), *map(str, times)]
     found = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
     return np.array(found).reshape(len(times), -1, 3)
 
 
-def test_three_js_shows_the_same(written: tuple[Path, Any, float]) -> None:
+@each_engine
+def test_engines_show_the_same(engine: str, written: tuple[Path, Any, float]) -> None:
     path, frames, fps = written
     shown = [0, 1, len(frames) // 2, len(frames) - 1]
-    assert farthest(shown_by_three(path, [k / fps for k in shown]), frames[shown]) < 1e-5
+    assert farthest(shown_by(engine, path, [k / fps for k in shown]), frames[shown]) < 1e-5
 
 
+@each_engine
 @pytest.mark.parametrize("has_skin", [True, False])
-def test_compressed_files_show_the_same(has_skin: bool, tmp_path: Path) -> None:
+def test_compressed_files_show_the_same(has_skin: bool, engine: str, tmp_path: Path) -> None:
     """In fewer bytes, and in another order of vertices; a skeleton and morph targets alike."""
     with gvpipe.open(RIGID) as video:
         sequence, frames = video.sequence(), video[:]
@@ -157,7 +165,8 @@ def test_compressed_files_show_the_same(has_skin: bool, tmp_path: Path) -> None:
     assert read.n_frames == len(frames) and len(read.faces) == len(sequence.faces)
     assert farthest(read.read(0, len(frames)), frames[:, sources]) < 2e-5
     shown = [0, 1, len(frames) // 2, len(frames) - 1]
-    assert farthest(shown_by_three(tmp_path / "small.glb", [k / video.fps for k in shown]), frames[shown][:, sources]) < 2e-5
+    found = shown_by(engine, tmp_path / "small.glb", [k / video.fps for k in shown])
+    assert farthest(found, frames[shown][:, sources]) < 2e-5
 
 
 def test_coarse_skeletons_have_coarse_keys(tmp_path: Path) -> None:
