@@ -17,6 +17,7 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import shape as shape_of
 
 if TYPE_CHECKING:
+    from gvpipe.model.clips import Clip
     from gvpipe.model.sequence import MeshSequence
 
 
@@ -24,7 +25,11 @@ if TYPE_CHECKING:
 @click.argument("source", metavar="INPUT")
 @click.argument("target", metavar="OUTPUT")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's; animated glTF is sampled at it.")
-@click.option("--clip", metavar="NAME", help="The animation to read, of a file that has several. [default: the first]")
+@click.option(
+    "--clip",
+    metavar="NAME|all",
+    help="The animation to read, of a file that has several; all: with --skin. [default: the first]",
+)
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--start", type=int, help="First frame. [default: 0]")
 @click.option("--stop", type=int, help="Frame after the last. [default: the end]")
@@ -65,7 +70,7 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
-    from gvpipe.cli.skeletons import check_glb_options, find_skin, smaller_without
+    from gvpipe.cli.skeletons import ALL, check_glb_options, clip_names, find_skin, read_clips, smaller_without
     from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
@@ -85,7 +90,13 @@ def convert(
             if lod
             else partial(files.read, given, clip=clip, mesh=mesh, unlimited=unlimited)
         )
-        if frames is not None:
+        clips: tuple[Clip, ...] = ()
+        if clip == ALL and (names := clip_names(given)):
+            if not skin or (first, last) != (0, None):
+                raise click.UsageError("--clip all is for --skin, and for whole clips: without --start, --stop and --frames")
+            some, clips = read_clips(names, lambda name, rate: files.read(given, rate, name), fps)
+            start, stop = 0, len(some)
+        elif frames is not None:
             some = read(fps=fps, frames=(first, last))
             start, stop = first, first + len(some)
         else:
@@ -94,6 +105,7 @@ def convert(
             some = whole.part(start, stop)
         sequence = chosen(some, parts, None, "convert", progress)
         found, said = find_skin(sequence, joints, target_kg, max_error, progress) if skin else (None, [])
+        found = found and replace(found, clips=clips)
         noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
         noticed += smaller_without(path, sequence) if found and compress == "none" else []
     for note in noticed:
@@ -101,6 +113,7 @@ def convert(
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
     values |= {"joints": found.joints if found else 0} if takes_skin(target) else {}
+    values |= {"clips": [each.name for each in clips]} if clips else {}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = shape_of(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
 from gvpipe.foundation.errors import InputError, OverBudget
+from gvpipe.io.clips import list_clips
 from gvpipe.io.writing import is_glb, takes_skin
+from gvpipe.model.clips import Clip, join_clips
 from gvpipe.skinning.fit import ONE_FRAME
 
 if TYPE_CHECKING:
@@ -17,6 +21,7 @@ if TYPE_CHECKING:
     from gvpipe.model.skin import Skin
     from gvpipe.playback.player import Player
 
+ALL = "all"  # clips, of --clip
 EXACT = 1e-5  # of the diagonal: a skeleton that is farther off is written on request alone
 
 Found = tuple["Skin | None", list[str]]  # a skeleton, and what to say of it
@@ -86,6 +91,25 @@ def find_skin(
     if not is_met:
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
     return skin, said
+
+
+def clip_names(path: str) -> list[str]:
+    """The clips of a file, each once; none where ``all`` is the name of one, or the file has none."""
+    names = list(dict.fromkeys(each.name for each in list_clips(path)))
+    return [] if ALL in names else names
+
+
+def read_clips(
+    names: list[str], read: Callable[[str, float | None], MeshSequence], fps: float | None
+) -> tuple[MeshSequence, tuple[Clip, ...]]:
+    """The clips of some names as one sequence, at a frame rate, or at the highest of theirs; raises as `join_clips` does."""
+    found = [read(name, fps) for name in names]
+    rate = max(each.fps for each in found)
+    if any(each.fps != rate for each in found):
+        found = [read(name, rate) for name in names]
+    sequence, clips = join_clips(list(zip(names, found, strict=True)))
+    notes = tuple(note for note in sequence.notes if not note.startswith("clip "))  # that others were not read
+    return replace(sequence, notes=notes), clips
 
 
 def smaller_without(path: str, sequence: MeshSequence) -> list[str]:

@@ -76,6 +76,8 @@ def write(
             raise InputError(f"{path}: a skeleton is written as one .glb or USD file; give such a name, or leave the skin out")
         check_skin(sequence, skin, path)
         if not is_glb(path):
+            if len(skin.clips) > 1:
+                raise InputError(f"{path}: USD has one animation; write a file for each clip, or a .glb")
             return tuple(USD_SKIN_WRITER(sequence, Path(path), skin))
         return tuple(SKIN_WRITER(sequence, skin, Path(path), is_packed))
     if is_packed:

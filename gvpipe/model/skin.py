@@ -8,6 +8,7 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError
+from gvpipe.model.clips import Clip
 
 INFLUENCES = 4  # joints that a vertex follows, at most
 
@@ -26,6 +27,7 @@ class Skin:
         transforms: ``(F, J, 4, 4) float64`` for columns, model units; affine, the last row is 0 0 0 1.
         error: largest distance of a vertex from what the skin was made of, in any frame, part of the first frame's diagonal;
             NaN: not measured.
+        clips: the animations that its frames are, one after the other; none: they are one.
 
     Raises:
         InputError: arrays do not fit each other.
@@ -36,6 +38,7 @@ class Skin:
     bind: Float32
     transforms: Float64
     error: float = float("nan")
+    clips: tuple[Clip, ...] = ()
 
     def __post_init__(self) -> None:
         n, (_, n_joints) = len(self.bind), self.transforms.shape[:2]
@@ -75,8 +78,8 @@ class Skin:
         return result.astype(np.float32)
 
     def part(self, start: int, stop: int) -> Skin:
-        """Frames ``start`` to ``stop`` alone."""
-        return replace(self, transforms=self.transforms[start:stop])
+        """Frames ``start`` to ``stop`` alone, as one animation."""
+        return replace(self, transforms=self.transforms[start:stop], clips=())
 
 
 def joint_means(skin: Skin, bind: Float32) -> Float64:

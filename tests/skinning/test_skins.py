@@ -22,6 +22,7 @@ from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.io.gltf.reader import read_poses
 from gvpipe.io.gltf.scene_writing import prepare
 from gvpipe.io.scene.affine_nodes import BETWEEN, factor, find_keys, matrices
+from gvpipe.model.clips import Clip, join_clips
 from gvpipe.model.skin import Skin
 
 RIGID = GOLDEN / "mcgv-1-rigid.mp4"  # without pictures; has frames that repeat, and vertices that stand still
@@ -246,6 +247,47 @@ def test_all_else_travels(tmp_path: Path) -> None:
     assert [part.name for part in found.parts] == [part.name for part in plain.parts]
     assert set(found.attributes) == set(plain.attributes) and np.array_equal(found.faces, plain.faces)
     assert farthest(found.read(0, found.n_frames), plain.read(0, plain.n_frames)) < 3 * skin.error + 1e-5
+
+
+def two_clips(tmp_path: Path) -> Path:
+    """A glTF file of a mesh that goes to x in one clip of 10 frames, and to z in one of 6, as the skin writer makes it."""
+    n, place = 9, np.eye(4)
+    bind = waving(3, 1).read(0, 1)[0]
+    transforms = np.tile(place, (16, 1, 1, 1))
+    transforms[:10, 0, 0, 3] = np.linspace(0, 2, 10)
+    transforms[10:, 0, 2, 3] = np.linspace(-1, 3, 6)
+    weights = np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1))
+    skin = Skin(np.zeros((n, 4), np.int32), weights, bind, transforms, 0.0, (Clip("go", 0, 10), Clip("stand up", 10, 16)))
+    gvpipe.write(replace(waving(3, 16), positions=skin.read(0, 16)), tmp_path / "two.glb", skin=skin)
+    return tmp_path / "two.glb"
+
+
+def test_all_clips_have_one_skeleton(tmp_path: Path, run: Any) -> None:
+    path = two_clips(tmp_path)
+    ended = run("convert", path, tmp_path / "out.glb", "--skin", "--clip", "all", "--json")
+    assert json.loads(ended.out)["clips"] == ["go", "stand up"] and json.loads(ended.out)["frames"] == 16
+    assert "others of the file" not in ended.err
+    for name, n_frames in (("go", 10), ("stand up", 6)):
+        given, found = gvpipe.read(path, clip=name), gvpipe.read(tmp_path / "out.glb", clip=name)
+        assert found.n_frames == given.n_frames == n_frames
+        assert farthest(found.read(0, n_frames), given.read(0, n_frames)) < 2e-3
+    assert len(_tree(tmp_path / "out.glb")["skins"]) == 1
+    assert gvpipe.read(path, clip="stand up").read(0, 1)[0, :, 2].min() == pytest.approx(-1, abs=0.1)
+    ended = run("convert", path, tmp_path / "b.glb", "--clip", "all")
+    assert ended.status == 2 and "--clip all is for --skin" in ended.err
+    ended = run("convert", path, tmp_path / "b.usdc", "--skin", "--clip", "all")
+    assert ended.status == 1 and "USD has one animation" in ended.err
+    assert not list(tmp_path.glob("b.*"))
+
+
+def test_clips_must_be_of_one_mesh() -> None:
+    with pytest.raises(InputError, match="'b' of .* has other triangles than 'a'"):
+        join_clips([("a", waving(3, 4)), ("b", waving(4, 4))])
+    with pytest.raises(InputError, match="another frame rate"):
+        join_clips([("a", waving(3, 4)), ("b", waving(3, 4).with_fps(7))])
+    joined, clips = join_clips([("a", waving(3, 4)), ("b", waving(3, 7))])
+    assert [tuple(each) for each in clips] == [("a", 0, 4), ("b", 4, 11)]
+    assert np.array_equal(joined.read(2, 6), np.concatenate([waving(3, 4).read(2, 4), waving(3, 7).read(0, 2)]))
 
 
 @pytest.mark.parametrize("suffix", [".usdc", ".usda", ".usdz"])

@@ -27,6 +27,7 @@ from gvpipe.io.gltf.quantizing import Lattice, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
 from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
+from gvpipe.model.clips import Clip
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
@@ -64,7 +65,9 @@ def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: boo
 
 def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     sources = prepared.split.sources
-    keys = find_keys(skin)
+    name = prepared.sequence.metadata.texts.get("clip") or "animation"
+    clips = skin.clips or (Clip(name, 0, skin.n_frames),)
+    keys = find_keys(skin.part(clips[0].start, clips[0].stop))
     limit = max(keys.precision, EXACT * float(np.linalg.norm(np.ptp(skin.bind, axis=0))))
     rounded = replace(skin, weights=(_as_fractions(skin.weights) / FULL).astype(np.float32))
     is_near = _farthest(skin, rounded) <= limit
@@ -87,7 +90,11 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     inverse = glb.array(_inverse_binds(keys.pivots, lattice))
     glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root, "inverseBindMatrices": inverse})
     glb.tree["scenes"][0]["nodes"].append(root)
-    _write_keys(glb, prepared.sequence, keys, numbers, float(np.ptp(skin.bind, axis=0).max()))
+    rest = AffineNodes(*(each[0] for each in keys.nodes))
+    extent = float(np.ptp(skin.bind, axis=0).max())
+    for clip in clips:
+        own = keys if clip is clips[0] else find_keys(skin.part(clip.start, clip.stop))
+        _write_keys(glb, prepared.sequence.fps, clip.name, own, rest, numbers, extent)
 
 
 def _farthest(skin: Skin, other: Skin) -> float:
@@ -133,9 +140,11 @@ def _write_joint(glb: Glb, nodes: AffineNodes, j: int) -> tuple[int, int]:
     return glb.append("nodes", {"name": f"joint_{j}_frame", "children": [inner], **first}), inner
 
 
-def _write_keys(glb: Glb, sequence: MeshSequence, keys: Keys, numbers: list[tuple[int, int]], extent: float) -> None:
-    """Add the animation: keys of what moves; a skeleton that stands has two of its first joint."""
-    times = (np.arange(len(keys.is_key)) / (PER_FRAME * sequence.fps)).astype(np.float32)[:, None]
+def _write_keys(
+    glb: Glb, fps: float, name: str, keys: Keys, rest: AffineNodes, numbers: list[tuple[int, int]], extent: float
+) -> None:
+    """Add an animation: keys of what moves, or is not as at rest ``(J, ...)``; one that is, has keys of its first joint."""
+    times = (np.arange(len(keys.is_key)) / (PER_FRAME * fps)).astype(np.float32)[:, None]
     samplers: list[Json] = []
     channels: list[Json] = []
     known: dict[bytes, int] = {}  # times are written once for all joints that share them
@@ -152,18 +161,17 @@ def _write_keys(glb: Glb, sequence: MeshSequence, keys: Keys, numbers: list[tupl
         reach = max(float(keys.reach[j]), STANDS * extent)
         scaled = keys.precision / reach
         turned = scaled / max(1.0, float(np.abs(keys.nodes.scales[:, j]).max()))  # an angle
-        for node, path, values, tolerance, step in (
-            (outer, "translation", keys.nodes.translations[:, j], STANDS * extent, keys.precision),
-            (outer, "rotation", keys.nodes.rotations[:, j], STANDS, turned),
-            (outer, "scale", keys.nodes.scales[:, j], STANDS, scaled),
-            (inner, "rotation", keys.nodes.inner[:, j], STANDS, turned),
+        for node, path, values, still, tolerance, step in (
+            (outer, "translation", keys.nodes.translations, rest.translations, STANDS * extent, keys.precision),
+            (outer, "rotation", keys.nodes.rotations, rest.rotations, STANDS, turned),
+            (outer, "scale", keys.nodes.scales, rest.scales, STANDS, scaled),
+            (inner, "rotation", keys.nodes.inner, rest.inner, STANDS, turned),
         ):
-            if moves(values, tolerance):
-                add(node, path, keys.is_key[:, j], values, step)
+            if moves(values[:, j], still[j], tolerance):
+                add(node, path, keys.is_key[:, j], values[:, j], step)
     if not channels:
         add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0], keys.precision)
-    name = sequence.metadata.texts.get("clip") or "animation"
-    glb.append("animations", {"name": name, "samplers": samplers, "channels": channels, "extras": {FPS: sequence.fps}})
+    glb.append("animations", {"name": name, "samplers": samplers, "channels": channels, "extras": {FPS: fps}})
 
 
 def _write_vectors(glb: Glb, values: Float64, step: float) -> int:

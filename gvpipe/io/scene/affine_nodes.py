@@ -286,6 +286,6 @@ def _quaternions(rotations: Float64) -> Float64:
     return np.asarray(found * signs[..., None])
 
 
-def moves(values: Array, tolerance: float) -> bool:
-    """Whether numbers ``(G, C)`` differ from the first moment's."""
-    return bool((np.abs(values - values[:1]) > tolerance).any())
+def moves(values: Array, rest: Array, tolerance: float) -> bool:
+    """Whether numbers ``(G, C)`` differ from those at rest ``(C,)`` at any moment."""
+    return bool((np.abs(values - rest) > tolerance).any())
