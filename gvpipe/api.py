@@ -305,8 +305,8 @@ def skin(
 
     Args:
         source: a sequence, or what `gvpipe.read` takes.
-        joints: how many, 1..1024; 0: as many as the error takes, 256 at most.
-        target_kg: Karni and Gotsman's error that it should not exceed, percent; 0.14 if no error is given.
+        joints: about how many, 1..1024; 0: as many as the error takes.
+        target_kg: Karni and Gotsman's error that it should not exceed, percent; 0.14 if neither errors nor joints are given.
         max_error: largest distance of a vertex, as of `encode`.
         progress: called with each stage and the part of it that is done.
 

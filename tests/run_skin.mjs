@@ -8,6 +8,7 @@ const load = (name) => import(pathToFileURL(`${folder}/${name}`).href);
 const THREE = await load("build/three.module.js");
 const { GLTFLoader } = await load("examples/jsm/loaders/GLTFLoader.js");
 
+globalThis.self = globalThis; // pictures are made with what a page has
 const data = readFileSync(file);
 const bytes = data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength);
 const { MeshoptDecoder } = await load("examples/jsm/libs/meshopt_decoder.module.js");

@@ -206,7 +206,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
-@click.option("--skin/--no-skin", default=None, help="Of a .glb: a skeleton, or morph targets. [default: what is exact]")
+@click.option("--skin/--no-skin", default=None, help="Of a .glb or USD: a skeleton or none. [default: of a .glb if exact]")
 @compress_option
 @unlimited_option
 @output_options

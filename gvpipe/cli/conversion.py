@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
-@click.option("--skin", is_flag=True, help="Find a skeleton, and write a .glb with it in place of morph targets.")
-@click.option("--joints", type=int, default=0, help="Of the skeleton. [default: as many as the error takes, 256 at most]")
+@click.option("--skin", is_flag=True, help="Find a skeleton, and write a .glb or USD file that it moves.")
+@click.option("--joints", type=int, default=0, help="About how many, of the skeleton. [default: as many as the error takes]")
 @click.option("--target-kg", type=float, help="Largest KG error of the skeleton, percent. [default: 0.14]")
 @click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
 @compress_option
@@ -107,7 +107,7 @@ def convert(
         found, said = find_skin(sequence, joints, target_kg, max_error, progress) if skin else (None, [])
         found = found and replace(found, clips=clips)
         noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
-        noticed += smaller_without(path, sequence) if found and compress == "none" else []
+        noticed += smaller_without(path, sequence, compress) if found and not found.clips else []
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gvpipe.model.skin import Skin
     from gvpipe.playback.player import Player
 
+MAY_BE_SMALLER = 0.25  # of the largest size that targets may have: many vertices may stand still
 ALL = "all"  # clips, of --clip
 EXACT = 1e-5  # of the diagonal: a skeleton that is farther off is written on request alone
 
@@ -63,6 +64,10 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
     if wanted is None and not skin.error <= EXACT:
         return None, [f"written with morph targets, since the file's skeleton is up to {off} off (--skin takes it)"]
     how = "exact" if skin.error <= EXACT else f"up to {off} off"
+    if not is_glb(path):
+        return skin, [
+            f"written with a skeleton of {_joints(skin)}, {how} but for USD's half-float scales; --no-skin writes points"
+        ]
     return skin, [f"written with a skeleton of {_joints(skin)}, {how}; --no-skin writes morph targets"]
 
 
@@ -112,12 +117,18 @@ def read_clips(
     return replace(sequence, notes=notes), clips
 
 
-def smaller_without(path: str, sequence: MeshSequence) -> list[str]:
-    """A note where a file with a skeleton takes more bytes than one with morph targets would."""
-    targets = 12 * sequence.n_vertices * (sequence.n_frames - 1)  # what each frame adds to positions
-    if os.path.getsize(path) <= targets:
+def smaller_without(path: str, sequence: MeshSequence, compress: str) -> list[str]:
+    """A note where a file with a skeleton takes more bytes than one with morph targets; it is written where it may."""
+    from gvpipe.foundation.atomic import temporary_folder
+    from gvpipe.playback.files import write
+
+    size = os.path.getsize(path)
+    if not is_glb(path) or MAY_BE_SMALLER * 12 * sequence.n_vertices * (sequence.n_frames - 1) > size:
         return []
-    return [f"morph targets would take about {targets / 1e3:.0f} kB beside the mesh; leave out --skin for these"]
+    with temporary_folder() as folder:
+        write(sequence, os.path.join(folder, "morph.glb"), compress=compress)
+        other = os.path.getsize(os.path.join(folder, "morph.glb"))
+    return [f"with morph targets it would have {other} bytes, not {size}; leave out --skin for these"] if other < size else []
 
 
 def _joints(skin: Skin) -> str:

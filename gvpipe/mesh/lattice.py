@@ -40,8 +40,9 @@ class Lattice:
 
         Origin and step are short decimal numbers, which take fewer bytes in a header.
         """
-        x, y, z = (float(str(low)) for low in points.min(axis=0).astype(np.float32))
-        return cls((x, y, z), float(f"{step:.6g}") if step > 0 else 1.0)
+        step = float(f"{step:.6g}") if step > 0 else 1.0
+        x, y, z = (_short(low, step) for low in points.min(axis=0).astype(np.float32))
+        return cls((x, y, z), step)
 
     def quantise(self, points: Floats) -> Int32:
         """Return the nearest lattice indices, ``(V, 3) int32``."""
@@ -50,3 +51,9 @@ class Lattice:
     def points_at(self, indices: Integers) -> Float64:
         """Return the lattice points, ``(V, 3)``, model units."""
         return np.asarray(np.asarray(self.origin) + indices * self.step)
+
+
+def _short(low: np.float32, step: float) -> float:
+    """The shortest decimal number that float32 rounds to a coordinate, if the coordinate's index is then not below 0."""
+    number = float(str(low))
+    return number if number - float(low) <= step / 2 else float(low)

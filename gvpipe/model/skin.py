@@ -10,6 +10,7 @@ from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError
 from gvpipe.model.clips import Clip
 
+ROUNDING = 1e-5  # of the sum of weights
 INFLUENCES = 4  # joints that a vertex follows, at most
 
 
@@ -41,12 +42,19 @@ class Skin:
     clips: tuple[Clip, ...] = ()
 
     def __post_init__(self) -> None:
-        n, (_, n_joints) = len(self.bind), self.transforms.shape[:2]
+        for name, dtype in (("indices", np.int32), ("weights", np.float32), ("bind", np.float32), ("transforms", np.float64)):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype))
+        n, n_joints = len(self.bind), self.transforms.shape[1] if self.transforms.ndim > 1 else 0
         shapes = self.indices.shape, self.weights.shape, self.bind.shape, self.transforms.shape[2:]
         if shapes != ((n, INFLUENCES), (n, INFLUENCES), (n, 3), (4, 4)):
             raise InputError(f"a skin's arrays are of shapes {shapes}; (V, 4), (V, 4), (V, 3) and (F, J, 4, 4) are needed")
         if n and not 0 <= self.indices.min() <= self.indices.max() < n_joints:
             raise InputError(f"a skin names joints {self.indices.min()}..{self.indices.max()}; there are {n_joints}")
+        if not (np.isfinite(self.transforms).all() and np.isfinite(self.bind).all()):
+            raise InputError("a skin's bind pose or transforms are not finite")
+        off = np.abs(self.weights.sum(axis=1, dtype=np.float64) - 1).max(initial=0)
+        if not (self.weights.min(initial=0) >= 0 and off <= ROUNDING):
+            raise InputError("a skin's weights are below 0, or do not add up to 1 at each vertex; divide them by their sum")
 
     @property
     def joints(self) -> int:
@@ -88,3 +96,8 @@ def joint_means(skin: Skin, bind: Float32) -> Float64:
     points = np.concatenate([bind.astype(np.float64), np.ones((len(bind), 1))], axis=1)
     np.add.at(sums, skin.indices, skin.weights[:, :, None] * points[:, None])
     return np.asarray(sums[:, :3] / np.where(sums[:, 3:] > 0, sums[:, 3:], 1))
+
+
+def extent_of(points: Float32) -> float:
+    """The diagonal of the box around ``points (V, 3)``, without the overflow of float32."""
+    return float(np.linalg.norm(np.ptp(points.astype(np.float64), axis=0)))

@@ -82,8 +82,9 @@ def fit_skin(
 
     Args:
         sequence: to be moved.
-        joints: how many, 1..1024; 0: as many as it takes.
-        kg, largest: as of `Wanted`; where neither is given, a KG error of `DEFAULT_KG`.
+        joints: about how many, 1..1024: those that nothing follows go, and what stands still has one more; 0: as many as
+            it takes.
+        kg, largest: as of `Wanted`; where neither is given, nor a number of joints, a KG error of `DEFAULT_KG`.
         progress: called with each stage and the part of it that is done.
 
     Raises:
@@ -94,7 +95,7 @@ def fit_skin(
         raise SettingError(f"joints is {joints!r}; an integer in 1..{MOST} is needed, or 0 for as many as it takes")
     if sequence.n_frames < 2:
         raise InputError(f"{sequence.name}: {ONE_FRAME}")
-    wanted = Wanted(DEFAULT_KG if kg is None and largest is None else kg, largest)
+    wanted = Wanted(DEFAULT_KG if kg is None and largest is None and not joints else kg, largest)
     best: Fitted | None = None
     for skin in _candidates(sequence, joints, wanted, progress or silent):
         own, errors = measured(skin, sequence)

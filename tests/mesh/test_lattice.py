@@ -24,3 +24,12 @@ def test_lattice(seed: int, bits: int, scale: float) -> None:
 def test_lattice_of_one_place() -> None:
     lattice = Lattice.over(np.full((3, 3), 7.5), 12)
     assert np.array_equal(lattice.points_at(lattice.quantise(np.full((3, 3), 7.5))), np.full((3, 3), 7.5))
+
+
+@settings(max_examples=120)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e2, 1e4, 1e5, 1e7]))
+def test_no_index_is_below_0_far_from_the_origin(seed: int, away: float) -> None:
+    """Though the origin is a short number, and steps are finer than float32 there."""
+    points = (np.random.default_rng(seed).random((20, 3)) + away).astype(np.float32)
+    lattice = Lattice.spaced(points, 1e-5)
+    assert lattice.quantise(points).min() >= 0

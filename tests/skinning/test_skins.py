@@ -23,6 +23,7 @@ from gvpipe.io.gltf.reader import read_poses
 from gvpipe.io.gltf.scene_writing import prepare
 from gvpipe.io.scene.affine_nodes import BETWEEN, factor, find_keys, matrices
 from gvpipe.model.clips import Clip, join_clips
+from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
 RIGID = GOLDEN / "mcgv-1-rigid.mp4"  # without pictures; has frames that repeat, and vertices that stand still
@@ -204,6 +205,48 @@ def test_weights_and_positions_that_joints_pull_apart_stay_exact(tmp_path: Path)
         assert farthest(found, skin.read(0, sequence.n_frames)[:, sources]) < 2e-4  # float32 of a thousand sizes
 
 
+def grown(sizes: Any, extent: float = 1.0) -> MeshSequence:
+    """A sheet that grows from frame to frame."""
+    sheet = waving(8, 1)
+    return replace(sheet, positions=np.stack([sheet.read(0, 1)[0] * (extent * size) for size in sizes]).astype(np.float32))
+
+
+@pytest.mark.parametrize("compress", ["none", "meshopt"])
+@pytest.mark.parametrize("extent", [1.0, 1e-5, 1e30, 1e-25])
+@pytest.mark.parametrize("first", [0.0, 0.5])
+def test_sheets_of_any_size_grow_from_nothing(first: float, extent: float, compress: str, tmp_path: Path) -> None:
+    """Where the first frame is a point, no diagonal says how fine is fine enough: then nothing is rounded."""
+    sequence = grown(np.linspace(first, 1, 9), extent)
+    for skin in (None, gvpipe.skin(sequence, joints=4)):
+        gvpipe.write(sequence, tmp_path / "a.glb", skin=skin, compress=compress)
+        sources = prepare(sequence, is_packed=compress != "none").split.sources
+        found = np.asarray(gvpipe.read(tmp_path / "a.glb").read(0, 9), np.float64)
+        given = np.asarray(sequence.read(0, 9) if skin is None else skin.read(0, 9), np.float64)[:, sources]
+        assert np.abs(found - given).max() < 1e-4 * np.abs(given).max()
+
+
+def test_a_frame_among_many_in_which_a_joint_goes_far(tmp_path: Path) -> None:
+    """It is looked at, wherever it is, so that positions of 16 bits are not taken where it moves them too far."""
+    sequence = waving(10, 100)
+    skin = gvpipe.skin(sequence, joints=6)
+    transforms = skin.transforms.copy()
+    transforms[53, 0, :3, :3] *= 1000
+    skin = replace(skin, transforms=transforms, error=2e-3)
+    gvpipe.write(replace(sequence, positions=skin.read(0, 100)), tmp_path / "a.glb", skin=skin, compress="meshopt")
+    sources = prepare(sequence, is_packed=True).split.sources
+    found = gvpipe.read(tmp_path / "a.glb").read(53, 54)[0]
+    own = skin.evaluate(53)[sources]
+    assert np.abs(found - own).max() < 3e-4 * diagonal(sequence.read(0, 1))
+
+
+def test_usd_refuses_scales_that_it_cannot_hold(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    sequence = grown(np.geomspace(1e-6, 1, 9))
+    with pytest.raises(InputError, match="USD's scales end at 65504"):
+        gvpipe.write(sequence, tmp_path / "a.usdc", skin=gvpipe.skin(sequence, joints=2))
+    assert not list(tmp_path.iterdir())
+
+
 def test_compression_of_what_moves_not_and_of_other_files(tmp_path: Path, run: Any) -> None:
     gvpipe.write(scene().part(0, 1), tmp_path / "still.glb", compress="meshopt")
     assert gvpipe.read(tmp_path / "still.glb").n_frames == 1 and "animations" not in _tree(tmp_path / "still.glb")
@@ -333,6 +376,11 @@ def test_what_is_refused(tmp_path: Path) -> None:
         replace(skin, indices=skin.indices + np.int32(9 - skin.indices.max()) * (skin.indices == skin.indices.max()))
     with pytest.raises(InputError, match="of shapes"):
         replace(skin, weights=skin.weights[:, :3])
+    for size in np.array([0.5, -1, np.nan], np.float32):
+        with pytest.raises(InputError, match="add up to 1"):
+            replace(skin, weights=size * skin.weights)
+    with pytest.raises(InputError, match="not finite"):
+        replace(skin, transforms=skin.transforms * np.nan)
     for joints in (-1, 1025):
         with pytest.raises(SettingError, match="joints is"):
             gvpipe.skin(sequence, joints=joints)
@@ -400,6 +448,7 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert gvpipe.read(tmp_path / "h.glb").n_frames == 6
     ended = run("convert", tmp_path / "in.npz", tmp_path / "i.glb", "--skin", "--joints", "8", "--frames", "0:2")
     assert ended.status == 0 and "leave out --skin" in ended.err
+    assert "no skeleton that was tried" not in ended.err  # no error was asked for
 
 
 def _tree(path: Path) -> dict[str, Any]:

@@ -3,9 +3,10 @@
 =======================  ==================================================  =========================
 attribute                as                                                  off by
 =======================  ==================================================  =========================
-positions                16 bits of the largest extent                       1 / 131,070 of it, an axis
-normals, tangents        8 bits of octahedral coordinates                    1 degree
-texture coordinates      16 bits, in 0..1; else steps of 1/65536             1 / 131,070
+positions of skeletons   16 bits of the largest extent, where that will do   1 / 131,070 of it, an axis
+other positions          floats in steps                                     5e-6 of the diagonal
+normals, tangents        8 bits of octahedral coordinates                    about a degree
+texture coordinates      16 bits, in 0..1; up to 128 floats in steps         1 / 131,070; 1 / 65,536
 others                   what they are                                       nothing
 =======================  ==================================================  =========================
 
@@ -28,6 +29,7 @@ EXTENSION = "KHR_mesh_quantization"
 FULL = 65535
 NORMAL_BITS = 8
 UV_STEP = 2.0**-16
+LEAST_STEP = 2.0**-120  # finer ones lie below what float32 has in full
 
 
 class Lattice(NamedTuple):
@@ -64,7 +66,8 @@ class Lattice(NamedTuple):
 
 def steps_of(values: Array, step: float) -> Filtered | None:
     """Floats ``(n, C)`` within a step, for packed files; None where they are too large for it, and stay what they are."""
-    return Filtered(pack_floats(values, step), "EXPONENTIAL") if np.abs(values).max(initial=0) < step * MANTISSA else None
+    is_held = step >= LEAST_STEP and np.abs(values).max(initial=0) < step * MANTISSA
+    return Filtered(pack_floats(values, step), "EXPONENTIAL") if is_held else None
 
 
 def quantized(one: GltfAttribute) -> GltfAttribute:

@@ -61,13 +61,16 @@ class Written:
     shape: Shape
 
 
-def prepare(sequence: MeshSequence, fields: tuple[str, ...] = (), is_packed: bool = False) -> Prepared:
+def prepare(
+    sequence: MeshSequence, fields: tuple[str, ...] = (), is_packed: bool = False, is_skinned: bool = False
+) -> Prepared:
     """Split vertices and convert attributes.
 
     Args:
         sequence: that is written.
         fields: names of fields that are written, too.
         is_packed: the file is compressed; vertices and triangles then have another order.
+        is_skinned: joints turn the normals of the first frame.
     """
     if not len(sequence.faces):
         raise InputError(f"{sequence.name} has no triangles; glTF needs one, so write .npz or .ply")
@@ -88,7 +91,7 @@ def prepare(sequence: MeshSequence, fields: tuple[str, ...] = (), is_packed: boo
         normals,
         {name: int(one.name.rpartition("_")[2]) for name, one in attributes.items() if one.name.startswith("TEXCOORD_")},
         place,
-        (*turned, *cut, *free, *(normals.notes if normals else ()), *lost_notes(sequence, "glTF", held)),
+        (*turned, *cut, *free, *(normals.notes if normals and not is_skinned else ()), *lost_notes(sequence, "glTF", held)),
     )
 
 

@@ -29,14 +29,15 @@ from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
 from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
 from gvpipe.model.clips import Clip
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.model.skin import Skin
+from gvpipe.model.skin import Skin, extent_of
 
 FULL = 65535  # a weight of 1
 MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
 STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
 QUATERNION_BITS, LEAST_BITS = 16, 4
 EXACT = 5e-6  # of the diagonal: what rounding may add where a skin is exact
-COMPARED = 16  # frames
+COMPARED = 16  # frames, of those that lie evenly, and of those where joints are farthest from rest
+TINY, FLAT = 1e-100, 1e-6  # FLAT: of a cube's volume
 ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
 
 
@@ -55,12 +56,12 @@ def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: boo
     """
     if skin.joints > MAX_JOINTS:
         raise InputError(f"{path}: {skin.joints} joints; glTF holds {MAX_JOINTS}, so make the skin with fewer")
-    prepared = prepare(sequence, is_packed=is_packed)
+    prepared = prepare(sequence, is_packed=is_packed, is_skinned=True)
     with glb_at(path, is_packed) as glb:
         _write(glb, prepared, skin)
     parents = any(shape.parent for shape in prepared.split.shapes)
-    own = prepared.normals is not None and prepared.normals.is_field
-    return (*prepared.notes, *((NO_PARENTS,) if parents else ()), *((TURNED_NORMALS,) if own else ()))
+    turned = prepared.normals is not None
+    return (*prepared.notes, *((NO_PARENTS,) if parents else ()), *((TURNED_NORMALS,) if turned else ()))
 
 
 def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
@@ -68,7 +69,7 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     name = prepared.sequence.metadata.texts.get("clip") or "animation"
     clips = skin.clips or (Clip(name, 0, skin.n_frames),)
     keys = find_keys(skin.part(clips[0].start, clips[0].stop))
-    limit = max(keys.precision, EXACT * float(np.linalg.norm(np.ptp(skin.bind, axis=0))))
+    limit = max(keys.precision, EXACT * extent_of(skin.bind))
     rounded = replace(skin, weights=(_as_fractions(skin.weights) / FULL).astype(np.float32))
     is_near = _farthest(skin, rounded) <= limit
     weights = _as_fractions(skin.weights[sources]) if is_near else skin.weights[sources]
@@ -91,7 +92,7 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root, "inverseBindMatrices": inverse})
     glb.tree["scenes"][0]["nodes"].append(root)
     rest = AffineNodes(*(each[0] for each in keys.nodes))
-    extent = float(np.ptp(skin.bind, axis=0).max())
+    extent = extent_of(skin.bind)
     for clip in clips:
         own = keys if clip is clips[0] else find_keys(skin.part(clip.start, clip.stop))
         _write_keys(glb, prepared.sequence.fps, clip.name, own, rest, numbers, extent)
@@ -102,8 +103,13 @@ def _farthest(skin: Skin, other: Skin) -> float:
 
     Weights and positions in fewer bits are near where joints are, and far where joints part.
     """
-    frames = np.unique(np.linspace(0, skin.n_frames - 1, COMPARED).astype(int))
-    return max(float(np.linalg.norm(skin.evaluate(k) - other.evaluate(k), axis=1).max(initial=0)) for k in frames)
+    size = extent_of(skin.bind) or 1.0
+    moved = np.abs(skin.transforms - np.eye(4))
+    moved[..., :3, 3] /= size
+    wildest = np.argsort(-moved.max(axis=(1, 2, 3)))[:COMPARED]
+    frames = np.unique([*np.linspace(0, skin.n_frames - 1, COMPARED).astype(int), *wildest])
+    off = ((skin.evaluate(k).astype(np.float64) - other.evaluate(k)) / size for k in frames)
+    return size * max(float(np.linalg.norm(each, axis=1).max(initial=0)) for each in off)
 
 
 def _inverse_binds(pivots: Float64, lattice: Lattice | None) -> Float32:
@@ -114,9 +120,15 @@ def _inverse_binds(pivots: Float64, lattice: Lattice | None) -> Float32:
 
 
 def _to_bind(skin: Skin, sources: Int64, normals: Array) -> Float32:
-    """Normals ``(W, 3)`` of the first frame, as the bind pose has them: ``A^T n``. ``A^-T`` takes them to the frame."""
-    first = skin.transforms[0, skin.indices[sources], :3, :3]  # (W, 4, 3, 3)
-    turned = np.einsum("wi,wiab,wa->wb", skin.weights[sources], first, normals)
+    """Normals ``(W, 3)`` of the first frame, as the bind pose has them: ``A^-1 n``.
+
+    Engines turn normals by the joints' matrices as they are (three.js, Babylon.js), not by their inverse transpose. So ``A``
+    takes them to the frame. Those of vertices that a joint flattens stay as they are.
+    """
+    blended = np.einsum("wi,wiab->wab", skin.weights[sources], skin.transforms[0, skin.indices[sources], :3, :3])
+    is_flat = np.abs(np.linalg.det(blended)) < FLAT * np.maximum(np.abs(blended).max(axis=(1, 2)), TINY) ** 3
+    blended[is_flat] = np.eye(3)
+    turned = np.linalg.solve(blended, normals.astype(np.float64)[:, :, None])[:, :, 0]
     length = np.linalg.norm(turned, axis=1, keepdims=True)
     return np.where(length > 0, turned / np.where(length > 0, length, 1), normals).astype(np.float32)
 
@@ -158,7 +170,7 @@ def _write_keys(
         samplers.append({"input": known[shown], "output": write(glb, values[is_key], step)})  # LINEAR, as by default
 
     for j, (outer, inner) in enumerate(numbers):
-        reach = max(float(keys.reach[j]), STANDS * extent)
+        reach = max(float(keys.reach[j]), STANDS * extent, TINY)
         scaled = keys.precision / reach
         turned = scaled / max(1.0, float(np.abs(keys.nodes.scales[:, j]).max()))  # an angle
         for node, path, values, still, tolerance, step in (
@@ -181,10 +193,10 @@ def _write_vectors(glb: Glb, values: Float64, step: float) -> int:
 
 def _write_rotations(glb: Glb, values: Float64, angle: float) -> int:
     """Add quaternions ``(n, 4)``, within an angle: as integers of 16 bits where these hold it."""
-    bits = int(np.ceil(np.log2(ANGLE / angle))) + 1
-    if bits > QUATERNION_BITS:
+    if angle * (1 << (QUATERNION_BITS - 1)) < ANGLE:
         return glb.block(values.astype(np.float32))
-    filtered = Filtered(pack_quaternions(values, max(bits, LEAST_BITS)), "QUATERNION") if glb.is_packed else None
+    bits = max(int(np.ceil(np.log2(ANGLE / angle))) + 1, LEAST_BITS)
+    filtered = Filtered(pack_quaternions(values, bits), "QUATERNION") if glb.is_packed else None
     return glb.block(np.rint(32767 * values).astype(np.int16), normalized=True, filtered=filtered)
 
 

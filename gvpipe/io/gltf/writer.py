@@ -27,7 +27,7 @@ from gvpipe.model.sequence import MeshSequence
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
 ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much
 EXACT = 5e-6  # of the diagonal: how far off positions of packed files may be
-NORMAL_STEP = 1 / 256  # of what targets of packed files add to normals
+NORMAL_STEP = 1 / 1024  # of what targets of packed files add to normals
 SMALL_INTEGERS = ("float32", "int8", "uint8", "int16", "uint16")
 
 
@@ -116,7 +116,7 @@ def _write_animation(glb: Glb, prepared: Prepared) -> int:
     sequence, sources = prepared.sequence, prepared.split.sources
     first = sequence.read(0, 1)[0]
     base, normals = first[sources], normals_of(prepared, 0, first)
-    step = EXACT * (float(np.linalg.norm(np.ptp(first, axis=0))) or 1.0)
+    step = EXACT * float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0)))
     scene = write_scene(glb, prepared, base, () if normals is None else (normals,), step=step)
     if sequence.n_frames == 1:
         return 0

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Bool, Float64, Int64
-from gvpipe.model.skin import Skin, joint_means
+from gvpipe.model.skin import Skin, extent_of, joint_means
 
 BLOCK = 32  # joints that are looked at together; what that takes is many times their matrices
 PER_FRAME = 4  # moments from a frame to the next: a power of two
@@ -65,7 +65,7 @@ class Keys(NamedTuple):
 def find_keys(skin: Skin) -> Keys:
     """The nodes and keys of a skin's joints: few where players find what lies between, more where they would not."""
     pivots = joint_pivots(skin)
-    diagonal = float(np.linalg.norm(np.ptp(skin.bind, axis=0)))
+    diagonal = extent_of(skin.bind)
     at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
     corners = _corners(skin, pivots)
     tolerances = diagonal * at_frames, diagonal * max(BETWEEN, at_frames)

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.errors import InputError
 from gvpipe.io.scene.affine_nodes import AffineNodes, factor, joint_pivots, moved_to
 from gvpipe.io.scene.export import ExportMesh
-from gvpipe.model.skin import INFLUENCES, Skin
+from gvpipe.model.skin import INFLUENCES, Skin, extent_of
 
+MOST_HALF = 65504.0  # the largest half float
 MOVES_FIRST = 1e-3  # of the diagonal: the first frame is the bind pose if no vertex is farther off
 
 
-def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, ExportMesh]], start: float) -> None:
+def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, ExportMesh]], start: float, name: str) -> None:
     """Add a skeleton below a SkelRoot, its animation, and how meshes follow it; their points are the bind pose.
 
     Args:
@@ -29,6 +31,10 @@ def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, Ex
         skin: of the sequence's vertices.
         meshes: as USD has them, without points.
         start: time code of the first frame.
+        name: of the file, for messages.
+
+    Raises:
+        InputError: a joint grows by more than a half float holds.
     """
     from pxr import Gf, Sdf, UsdSkel, Vt
 
@@ -41,7 +47,7 @@ def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, Ex
     skeleton.CreateRestTransformsAttr(Vt.Matrix4dArray([each for one in bind for each in (one, Gf.Matrix4d(1))]))
     animation = UsdSkel.Animation.Define(stage, f"{root}/Skeleton/Animation")
     animation.CreateJointsAttr(Vt.TokenArray(names))
-    _write_samples(animation, factor(moved_to(skin.transforms, pivots)), start)
+    _write_samples(animation, factor(moved_to(skin.transforms, pivots)), start, name)
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     for drawn, mesh in meshes:
         own = slice(*mesh.vertices)
@@ -58,7 +64,7 @@ def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, Ex
         binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1))
 
 
-def _write_samples(animation: Any, nodes: AffineNodes, start: float) -> None:
+def _write_samples(animation: Any, nodes: AffineNodes, start: float, name: str) -> None:
     """Translations, rotations and scales of the joints ``(F, J)``, each with the one below it."""
     from pxr import Usd, Vt
 
@@ -68,6 +74,12 @@ def _write_samples(animation: Any, nodes: AffineNodes, start: float) -> None:
         animation.CreateScalesAttr(),
     )
     n_frames, n_joints = nodes.scales.shape[:2]
+    largest = float(np.abs(nodes.scales).max(initial=0))
+    if largest > MOST_HALF:
+        raise InputError(
+            f"{name}: a joint grows to {largest:g} times the bind pose, and USD's scales end at {MOST_HALF:g}; write a .glb, "
+            "or points without a skeleton"
+        )
     moves = np.zeros((n_frames, n_joints, 2, 3))
     moves[:, :, 0] = nodes.translations
     sizes = np.ones((n_frames, n_joints, 2, 3))
@@ -82,6 +94,5 @@ def _write_samples(animation: Any, nodes: AffineNodes, start: float) -> None:
 
 def is_first_frame(skin: Skin) -> bool:
     """Whether the bind pose is the first frame, whose normals are then those of the bind pose."""
-    diagonal = float(np.linalg.norm(np.ptp(skin.bind, axis=0)))
     off: Float64 = np.linalg.norm(skin.evaluate(0).astype(np.float64) - skin.bind, axis=1)
-    return float(off.max(initial=0)) <= MOVES_FIRST * diagonal
+    return float(off.max(initial=0)) <= MOVES_FIRST * extent_of(skin.bind)

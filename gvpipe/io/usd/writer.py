@@ -111,7 +111,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     own = {name: one for name, one in usual.items() if not (name.startswith("uv") and one == f"st{name[2:]}")}
     said = [
         *([NO_PARENTS] if has_parents else []),
-        *normals.notes,
+        *(normals.notes if skin is None else ()),
         *shadow_note(shadowed(sequence), "USD"),
         *renamed_note(own.items(), "USD"),
         *unit_note(sequence, "USD"),
@@ -122,7 +122,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     if skin is None:
         _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
     else:
-        write_skeleton(stage, f"/{root}", skin, list(zip(drawn, meshes, strict=True)), start)
+        write_skeleton(stage, f"/{root}", skin, list(zip(drawn, meshes, strict=True)), start, name)
         said += _write_bind_normals(sequence, list(zip(drawn, meshes, strict=True)), normals, is_first_frame(skin))
         if sequence.origin.any():
             UsdGeom.Xformable(top).AddTranslateOp().Set(Gf.Vec3d(*sequence.origin.tolist()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,8 +62,8 @@ class Start:
 
     @property
     def key(self) -> str:
-        """The base frame's name in memos."""
-        return f"{self.lattice.step} {len(self.base)}"
+        """The base frame's name in memos: of its lattice, and of which vertices its points are, in which order."""
+        return f"{self.lattice.step} {_digest(self.sources)}"
 
     def moving(self) -> tuple[Int64, Int64]:
         """The given vertices ``(M,)`` that move, and the point ``(M,)`` of each."""
@@ -71,6 +72,11 @@ class Start:
         own = number[self.point]
         vertices = np.flatnonzero(own >= 0)
         return vertices, own[vertices]
+
+
+def _digest(numbers: Int64) -> str:
+    """A name for an array; two of one length may well differ: other steps merge other vertices."""
+    return hashlib.blake2b(np.ascontiguousarray(numbers).data, digest_size=16).hexdigest()
 
 
 def begin(job: Job, step: float, target_error: float, before: Start | None = None) -> Start:
@@ -87,7 +93,7 @@ def begin(job: Job, step: float, target_error: float, before: Start | None = Non
     members = np.unique(point, return_index=True)[1]
     lattice = choose_lattice(settings, first[members], min(base_step(step, given.n_frames), target_error))
     positions = quantise_base(settings, lattice, first[members])
-    bases, key = job.memo("bases", dict[tuple[float, int], tuple[EncodedMesh, WeldedMesh]]), (lattice.step, len(members))
+    bases, key = job.memo("bases", dict[tuple[float, str], tuple[EncodedMesh, WeldedMesh]]), (lattice.step, _digest(point))
     if key not in bases:
         if job.is_large:  # those before would take more memory than coding one of them again takes time
             bases.clear()

@@ -14,7 +14,7 @@ from gvpipe.io.gltf.meshopt.reading import ATTRIBUTES_HEADER, LEAST_TAIL, TRIANG
 
 OWN_CODES = 14  # pairs that have a code of their own
 BITS = 16  # of quaternions
-LEAST_EXPONENT, MOST_EXPONENT = -126, 104  # of steps: all that float32 holds is theirs
+LEAST_EXPONENT, MOST_EXPONENT = -126, 104  # of steps
 MANTISSA = (1 << 23) - 1  # the largest
 
 
