@@ -17,6 +17,8 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import shape as shape_of
 
 if TYPE_CHECKING:
+    from gvpipe.cli.skeletons import SkinOptions
+    from gvpipe.io.runs import Run
     from gvpipe.model.clips import Clip
     from gvpipe.model.sequence import MeshSequence
 
@@ -70,19 +72,20 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
-    from gvpipe.cli.skeletons import ALL, check_glb_options, clip_names, find_skin, read_clips, smaller_without
+    from gvpipe.cli.skeletons import ALL, SkinOptions, check_glb_options, clip_names, find_skin, read_clips, smaller_without
     from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
-    check_glb_options(target, skin, compress, split, (joints, target_kg, max_error) != (0, None, None))
+    wanted = SkinOptions(joints, target_kg, max_error)
+    check_glb_options(target, skin, compress, wanted)
     if split:
         if lod or start is not None or stop is not None or target == PIPE:
             raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
         options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), "unlimited": unlimited}
-        _convert_split(source, target, options, parts, out)
+        _convert_split(source, target, options, parts, wanted if skin else None, compress, out)
         return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         read = (
@@ -104,7 +107,7 @@ def convert(
             start, stop = files.frame_range(whole, first, last)
             some = whole.part(start, stop)
         sequence = chosen(some, parts, None, "convert", progress)
-        found, said = find_skin(sequence, joints, target_kg, max_error, progress) if skin else (None, [])
+        found, said = find_skin(sequence, wanted, progress) if skin else (None, [])
         found = found and replace(found, clips=clips)
         noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
         noticed += smaller_without(path, sequence, compress) if found and not found.clips else []
@@ -119,17 +122,31 @@ def convert(
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
 
 
-def _convert_split(source: str, target: str, options: dict[str, Any], parts: tuple[str, ...], out: Output) -> None:
-    """Convert each run of frames of one topology."""
+def _convert_split(
+    source: str,
+    target: str,
+    options: dict[str, Any],
+    parts: tuple[str, ...],
+    wanted: SkinOptions | None,
+    compress: str,
+    out: Output,
+) -> None:
+    """Convert each run of frames of one topology, with a skeleton of its own if one is wanted."""
     from gvpipe.cli.choices import chosen
+    from gvpipe.cli.skeletons import find_skin
     from gvpipe.cli.splitting import write_runs
     from gvpipe.playback import files
+
+    def write(run: Run, path: Path) -> tuple[int, list[str]]:
+        skin, said = find_skin(run.sequence, wanted, progress) if wanted and run.sequence.n_frames > 1 else (None, [])
+        notes = files.write(run.sequence, path, run.start, skin, compress)
+        return skin.joints if skin else 0, [*(f"{path.name}: {each}" for each in said), *notes]
 
     with source_path(source) as given, out.progress() as progress:
         runs = files.read_runs(given, **options)
         ready = [replace(run, sequence=chosen(run.sequence, parts, None, "convert", progress)) for run in runs]
-        written = write_runs(ready, target, lambda run, path: files.write(run.sequence, path, run.start))
-    every = (note for run, (_, said) in zip(runs, written, strict=True) for note in (*run.sequence.notes, *said))
+        written = write_runs(ready, target, write)
+    every = (note for run, (_, (_, said)) in zip(runs, written, strict=True) for note in (*run.sequence.notes, *said))
     noticed = list(dict.fromkeys(every))
     for note in noticed:
         out.note(note)
@@ -144,7 +161,8 @@ def _convert_split(source: str, target: str, options: dict[str, Any], parts: tup
             "triangles": len(run.sequence.faces),
             "origin": run.sequence.origin.tolist(),
         }
-        for (name, _), run in zip(written, ready, strict=True)
+        | ({"joints": n_joints} if wanted else {})
+        for (name, (n_joints, _)), run in zip(written, ready, strict=True)
     ]
     out.json({"files": listed, "notes": noticed})
     for each in listed:

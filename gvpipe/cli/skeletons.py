@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
@@ -26,6 +26,14 @@ ALL = "all"  # clips, of --clip
 EXACT = 1e-5  # of the diagonal: a skeleton that is farther off is written on request alone
 
 Found = tuple["Skin | None", list[str]]  # a skeleton, and what to say of it
+
+
+class SkinOptions(NamedTuple):
+    """What a skeleton should be like: ``--joints``, ``--target-kg`` and ``--max-error`` as given."""
+
+    joints: int = 0
+    target_kg: float | None = None
+    max_error: str | None = None
 
 
 def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bool | None, is_whole: bool) -> Found:
@@ -71,25 +79,23 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
     return skin, [f"written with a skeleton of {_joints(skin)}, {how}; --no-skin writes morph targets"]
 
 
-def check_glb_options(target: str, is_wanted: bool, compress: str, is_split: bool = False, others: bool = False) -> None:
+def check_glb_options(target: str, is_wanted: bool, compress: str, wanted: SkinOptions | None = None) -> None:
     """Raise `click.UsageError` for options of skeletons and of compression where there is none."""
-    if compress != "none" and (is_split or not is_glb(target)):
-        raise click.UsageError(f"--compress is for one .glb, without --split; OUTPUT is {target!r}")
-    if others and not is_wanted:
+    if compress != "none" and not is_glb(target):
+        raise click.UsageError(f"--compress is for a .glb; OUTPUT is {target!r}")
+    if wanted and wanted != SkinOptions() and not is_wanted:
         raise click.UsageError("--joints, --target-kg and --max-error are of --skin")
-    if is_wanted and (is_split or not takes_skin(target)):
-        raise click.UsageError(f"--skin writes one .glb or USD file, without --split; OUTPUT is {target!r}")
+    if is_wanted and not takes_skin(target):
+        raise click.UsageError(f"--skin writes a .glb or USD file; OUTPUT is {target!r}")
 
 
-def find_skin(
-    sequence: MeshSequence, joints: int, target_kg: float | None, max_error: str | None, progress: Progress | None
-) -> Found:
+def find_skin(sequence: MeshSequence, wanted: SkinOptions, progress: Progress | None) -> Found:
     """A skeleton for a sequence, and what to say of it; raises as `fit_skin` does."""
     from gvpipe.rate_control.targets import parse_bound
     from gvpipe.skinning.fit import fit_skin
 
-    bound = None if max_error is None else parse_bound(max_error, sequence)
-    skin, errors, is_met = fit_skin(sequence, joints, target_kg, bound, progress)
+    bound = None if wanted.max_error is None else parse_bound(wanted.max_error, sequence)
+    skin, errors, is_met = fit_skin(sequence, wanted.joints, wanted.target_kg, bound, progress)
     kg = "" if errors.kg is None else f"KG {errors.kg:.3g} %, "
     off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else f"{errors.max:.2g} units"
     said = [f"a skeleton of {_joints(skin)} moves it: {kg}vertices are up to {off} off"]

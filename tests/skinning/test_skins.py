@@ -255,7 +255,7 @@ def test_compression_of_what_moves_not_and_of_other_files(tmp_path: Path, run: A
     with pytest.raises(SettingError, match="'none' or 'meshopt'"):
         gvpipe.write(scene(), tmp_path / "a.glb", compress="draco")
     ended = run("decode", RIGID, tmp_path / "b.npz", "--compress", "meshopt")
-    assert ended.status == 2 and "--compress is for one .glb" in ended.err
+    assert ended.status == 2 and "--compress is for a .glb" in ended.err
     assert run("decode", RIGID, tmp_path / "b.glb", "--compress", "meshopt").status == 0
     gvpipe.write(waving(4, 5), tmp_path / "in.npz")
     assert run("convert", tmp_path / "in.npz", tmp_path / "c.glb", "--skin", "--compress", "meshopt").status == 0
@@ -446,6 +446,14 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert ended.status == 1 and "one frame" in ended.err and not (tmp_path / "g.glb").exists()
     assert run("decode", RIGID, tmp_path / "h.glb", "--frames", "3:9").status == 0
     assert gvpipe.read(tmp_path / "h.glb").n_frames == 6
+    frames = tmp_path / "frames"
+    gvpipe.write(waving(4, 5), frames / "%02d.obj")
+    gvpipe.write(waving(3, 4), frames / "%02d.obj", 5)
+    gvpipe.write(waving(4, 1), frames / "%02d.obj", 9)
+    ended = run("convert", frames, tmp_path / "shots.glb", "--skin", "--split", "--compress", "meshopt", "--json")
+    assert [each["joints"] > 0 for each in json.loads(ended.out)["files"]] == [True, True, False]
+    assert [gvpipe.read(tmp_path / f"shots-00{k}.glb").n_frames for k in range(3)] == [5, 4, 1]
+    assert "shots-001.glb: a skeleton of" in ended.err
     ended = run("convert", tmp_path / "in.npz", tmp_path / "i.glb", "--skin", "--joints", "8", "--frames", "0:2")
     assert ended.status == 0 and "leave out --skin" in ended.err
     assert "no skeleton that was tried" not in ended.err  # no error was asked for
