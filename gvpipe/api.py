@@ -299,6 +299,7 @@ def skin(
     *,
     target_kg: float | None = None,
     max_error: float | str | None = None,
+    rigid: bool = False,
     progress: Progress | None = None,
 ) -> Skin:
     """Find a skeleton that moves a sequence: joints, weights, and the joints' transforms in every frame.
@@ -308,6 +309,7 @@ def skin(
         joints: about how many, 1..1024; 0: as many as the error takes.
         target_kg: Karni and Gotsman's error that it should not exceed, percent; 0.14 if neither errors nor joints are given.
         max_error: largest distance of a vertex, as of `encode`.
+        rigid: joints turn, go and grow alike along all axes, one below the other, as bones of engines do; else they are affine.
         progress: called with each stage and the part of it that is done.
 
     Returns:
@@ -329,7 +331,7 @@ def skin(
         check_path(source, "gvpipe.skin's source", "a MeshSequence or ")
     sequence = source if isinstance(source, MeshSequence) else read(source)
     bound = None if max_error is None else parse_bound(max_error, sequence)
-    return fit_skin(sequence, int(joints), target_kg, bound, progress).skin
+    return fit_skin(sequence, int(joints), target_kg, bound, progress, rigid).skin
 
 
 def render(

@@ -40,7 +40,11 @@ if TYPE_CHECKING:
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
 @click.option("--skin", is_flag=True, help="Find a skeleton, and write a .glb or USD file that it moves.")
-@click.option("--joints", type=int, default=0, help="About how many, of the skeleton. [default: as many as the error takes]")
+@click.option(
+    "--joints",
+    metavar="N|rigid|rigid:N",
+    help="About how many, of the skeleton; rigid: bones without shear, in a tree. [default: as many as the error takes]",
+)
 @click.option("--target-kg", type=float, help="Largest KG error of the skeleton, percent. [default: 0.14]")
 @click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
 @compress_option
@@ -59,7 +63,7 @@ def convert(
     lod: int,
     split: bool,
     skin: bool,
-    joints: int,
+    joints: str | None,
     target_kg: float | None,
     max_error: str | None,
     compress: str,
@@ -72,14 +76,24 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
-    from gvpipe.cli.skeletons import ALL, SkinOptions, check_glb_options, clip_names, find_skin, read_clips, smaller_without
+    from gvpipe.cli.skeletons import (
+        ALL,
+        SkinOptions,
+        check_glb_options,
+        clip_names,
+        find_skin,
+        parse_joints,
+        read_clips,
+        smaller_without,
+    )
     from gvpipe.io.writing import takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
-    wanted = SkinOptions(joints, target_kg, max_error)
+    number, is_rigid = parse_joints(joints)
+    wanted = SkinOptions(number, target_kg, max_error, is_rigid)
     check_glb_options(target, skin, compress, wanted)
     if split:
         if lod or start is not None or stop is not None or target == PIPE:

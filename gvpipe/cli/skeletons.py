@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gvpipe.playback.player import Player
 
 MAY_BE_SMALLER = 0.25  # of the largest size that targets may have: many vertices may stand still
+RIGID = "rigid"  # of --joints
 ALL = "all"  # clips, of --clip
 EXACT = 1e-5  # of the diagonal: a skeleton that is farther off is written on request alone
 
@@ -29,11 +30,29 @@ Found = tuple["Skin | None", list[str]]  # a skeleton, and what to say of it
 
 
 class SkinOptions(NamedTuple):
-    """What a skeleton should be like: ``--joints``, ``--target-kg`` and ``--max-error`` as given."""
+    """What a skeleton should be like: ``--joints``, ``--target-kg`` and ``--max-error``."""
 
     joints: int = 0
     target_kg: float | None = None
     max_error: str | None = None
+    is_rigid: bool = False
+
+
+def parse_joints(text: str | None) -> tuple[int, bool]:
+    """How many joints, 0 for any number, and whether they are rigid, of ``N``, ``rigid`` or ``rigid:N``.
+
+    Raises `click.UsageError`.
+
+    Examples:
+        >>> parse_joints("64"), parse_joints("rigid"), parse_joints("rigid:24"), parse_joints(None)
+        ((64, False), (0, True), (24, True), (0, False))
+    """
+    kind, _, number = (text or "").rpartition(":") if ":" in (text or "") else ("", "", text or "")
+    if number == RIGID and not kind:
+        return 0, True
+    if kind in ("", RIGID) and (not text or (number.isascii() and number.removeprefix("-").isdigit())):
+        return int(number or 0), kind == RIGID
+    raise click.UsageError(f"--joints is {text!r}; a number, rigid or rigid:NUMBER is needed")
 
 
 def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bool | None, is_whole: bool) -> Found:
@@ -95,10 +114,11 @@ def find_skin(sequence: MeshSequence, wanted: SkinOptions, progress: Progress | 
     from gvpipe.skinning.fit import fit_skin
 
     bound = None if wanted.max_error is None else parse_bound(wanted.max_error, sequence)
-    skin, errors, is_met = fit_skin(sequence, wanted.joints, wanted.target_kg, bound, progress)
+    skin, errors, is_met = fit_skin(sequence, wanted.joints, wanted.target_kg, bound, progress, wanted.is_rigid)
     kg = "" if errors.kg is None else f"KG {errors.kg:.3g} %, "
     off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else f"{errors.max:.2g} units"
-    said = [f"a skeleton of {_joints(skin)} moves it: {kg}vertices are up to {off} off"]
+    kind = "rigid " if wanted.is_rigid else ""
+    said = [f"a {kind}skeleton of {_joints(skin)} moves it: {kg}vertices are up to {off} off"]
     if not is_met:
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
     return skin, said

@@ -29,6 +29,9 @@ class Skin:
         error: largest distance of a vertex from what the skin was made of, in any frame, part of the first frame's diagonal;
             NaN: not measured.
         clips: the animations that its frames are, one after the other; none: they are one.
+        parents: ``(J,) int32`` of joints that turn, go and grow alike along all axes: the one above each, -1 for none; None:
+            joints are affine, and none is above another one.
+        pivots: ``(J, 3) float64``, where each joint lies in the bind pose; None: in the middle of what follows it.
 
     Raises:
         InputError: arrays do not fit each other.
@@ -40,6 +43,8 @@ class Skin:
     transforms: Float64
     error: float = float("nan")
     clips: tuple[Clip, ...] = ()
+    parents: Int32 | None = None
+    pivots: Float64 | None = None
 
     def __post_init__(self) -> None:
         for name, dtype in (("indices", np.int32), ("weights", np.float32), ("bind", np.float32), ("transforms", np.float64)):

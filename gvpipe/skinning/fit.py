@@ -23,6 +23,7 @@ from gvpipe.foundation.progress import Progress, silent
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal, measure_errors
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import INFLUENCES, Skin, joint_means
+from gvpipe.skinning.rigid_fit import make_rigid
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -77,6 +78,7 @@ def fit_skin(
     kg: float | None = None,
     largest: float | None = None,
     progress: Progress | None = None,
+    rigid: bool = False,
 ) -> Fitted:
     """The skeleton with the fewest joints that holds an error, or the best of those that were tried.
 
@@ -86,6 +88,7 @@ def fit_skin(
             it takes.
         kg, largest: as of `Wanted`; where neither is given, nor a number of joints, a KG error of `DEFAULT_KG`.
         progress: called with each stage and the part of it that is done.
+        rigid: joints turn, go and grow alike along all axes, and are tied to a tree (`gvpipe.skinning.rigid_fit`).
 
     Raises:
         InputError: there is one frame, or a frame cannot be read.
@@ -97,7 +100,7 @@ def fit_skin(
         raise InputError(f"{sequence.name}: {ONE_FRAME}")
     wanted = Wanted(DEFAULT_KG if kg is None and largest is None and not joints else kg, largest)
     best: Fitted | None = None
-    for skin in _candidates(sequence, joints, wanted, progress or silent):
+    for skin in _candidates(sequence, joints, wanted, progress or silent, rigid):
         own, errors = measured(skin, sequence)
         found = Fitted(own, errors, wanted.is_met(errors))
         if found.is_met:
@@ -109,9 +112,9 @@ def fit_skin(
     return best
 
 
-def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Progress) -> Iterator[Skin]:
+def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Progress, rigid: bool) -> Iterator[Skin]:
     kg, last = wanted.kg if wanted.kg is not None else DEFAULT_KG, 0
-    tries = ((joints, 1.0),) if joints else ((0, LOOSE), (0, 1.0), *((count, 1.0) for count in MORE))
+    tries = ((joints, 1.0),) if joints else ((0, 1.0 if rigid else LOOSE), (0, 1.0), *((count, 1.0) for count in MORE))
     for count, factor in tries:
         if 0 < count <= last:
             continue
@@ -121,6 +124,9 @@ def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Pro
         if coarse is None:
             return
         last = coarse.joints
+        if rigid:
+            yield make_rigid(coarse, sequence, report)
+            continue
         yield refit(coarse, sequence, report)
         yield coarse  # better where the codec's bind pose is smoother than the first frame
 

@@ -25,6 +25,7 @@ from gvpipe.io.scene.affine_nodes import BETWEEN, factor, find_keys, matrices
 from gvpipe.model.clips import Clip, join_clips
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
+from gvpipe.skinning.rigid_fit import similar
 
 RIGID = GOLDEN / "mcgv-1-rigid.mp4"  # without pictures; has frames that repeat, and vertices that stand still
 THREE = ROOT / "gvpipe" / "web" / "node_modules" / "three"
@@ -273,6 +274,65 @@ def test_a_skeleton_is_found_for_a_sequence(tmp_path: Path) -> None:
     assert farthest(gvpipe.read(tmp_path / "a.glb").read(0, len(frames)), frames) < 1e-3
 
 
+def bent_arm() -> MeshSequence:
+    """A tube of three bones, each of which turns against the one before it."""
+    tube = waving(12, 1)
+    bind = tube.read(0, 1)[0].astype(np.float64)
+    along = (bind[:, 0] - bind[:, 0].min()) / np.ptp(bind[:, 0]) * 3
+    joints = [bind[:, 0].min() + np.ptp(bind[:, 0]) * k / 3 for k in range(3)]
+    frames = []
+    for angle in np.linspace(0, 0.8, 20):
+        frame, turned = bind.copy(), np.eye(3, 4)
+        for k, x in enumerate(joints):
+            hinge = turned[:, :3] @ [x, 0, 0] + turned[:, 3]
+            turn = Rotation.from_euler("z", angle * (k > 0)).as_matrix() @ turned[:, :3]
+            turned = np.concatenate([turn, (hinge - turn @ [x, 0, 0])[:, None]], axis=1)
+            own = along >= k
+            frame[own] = bind[own] @ turned[:, :3].T + turned[:, 3]
+        frames.append(frame)
+    return replace(tube, positions=np.array(frames, np.float32))
+
+
+def test_rigid_joints_turn_and_hang_together(tmp_path: Path) -> None:
+    """Nothing is sheared; each joint is one node below its parent, and engines show what the skin says."""
+    sequence = bent_arm()
+    skin = gvpipe.skin(sequence, joints=3, rigid=True)
+    assert skin.parents is not None and skin.pivots is not None and skin.error < 2e-3
+    linear = skin.transforms[:, :, :3, :3]
+    square = linear @ np.swapaxes(linear, -1, -2)
+    size = np.trace(square, axis1=-2, axis2=-1)[..., None, None] / 3
+    assert np.abs(square - size * np.eye(3)).max() < 1e-9 and (np.linalg.det(linear) > 0).all()
+    assert (skin.parents < 0).sum() == 1  # one tree
+    gvpipe.write(sequence, tmp_path / "a.glb", skin=skin)
+    nodes = _tree(tmp_path / "a.glb")["nodes"]
+    assert sum(node["name"].startswith("joint_") for node in nodes if "name" in node) == skin.joints
+    assert farthest(gvpipe.read(tmp_path / "a.glb").read(0, 20), skin.read(0, 20)) < max(1e-5, 0.02 * skin.error)
+    shown = shown_by("Babylon.js", tmp_path / "a.glb", [0, 10 / sequence.fps])
+    assert farthest(shown, skin.read(0, 20)[[0, 10]]) < max(1e-5, 0.02 * skin.error)
+
+
+def test_rigid_joints_lie_at_the_hinges() -> None:
+    sequence = bent_arm()
+    skin = gvpipe.skin(sequence, joints=3, rigid=True)
+    assert skin.pivots is not None and skin.parents is not None
+    low, size = float(sequence.read(0, 1)[0, :, 0].min()), float(np.ptp(sequence.read(0, 1)[0, :, 0]))
+    found = skin.pivots[skin.parents >= 0, 0]
+    for hinge in (low + size / 3, low + 2 * size / 3):
+        assert np.abs(found - hinge).min() < 0.1 * size
+
+
+def test_similar_motions_are_found() -> None:
+    draw = np.random.default_rng(0)
+    points = draw.normal(size=(20, 3))
+    turns = Rotation.random(5, random_state=1).as_matrix() * draw.uniform(0.5, 2, 5)[:, None, None]
+    shifts = draw.normal(size=(5, 3))
+    targets = np.einsum("fab,nb->fna", turns, points) + shifts[:, None]
+    found = similar(points, draw.random(20), targets)
+    assert np.allclose(found[..., :3], turns) and np.allclose(found[..., 3], shifts)
+    mirrored = similar(points, np.ones(20), points[None] * [1, 1, -1])
+    assert np.linalg.det(mirrored[0, :, :3]) > 0
+
+
 def test_fewer_joints_err_more() -> None:
     sequence = waving(10, 12)
     errors = [gvpipe.skin(sequence, joints=count).error for count in (1, 4, 16)]
@@ -446,6 +506,10 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert ended.status == 1 and "one frame" in ended.err and not (tmp_path / "g.glb").exists()
     assert run("decode", RIGID, tmp_path / "h.glb", "--frames", "3:9").status == 0
     assert gvpipe.read(tmp_path / "h.glb").n_frames == 6
+    ended = run("convert", tmp_path / "in.npz", tmp_path / "r.glb", "--skin", "--joints", "rigid:4", "--json")
+    assert ended.status == 0 and "a rigid skeleton of" in ended.err and json.loads(ended.out)["joints"] >= 2
+    ended = run("convert", tmp_path / "in.npz", tmp_path / "s.glb", "--skin", "--joints", "stiff")
+    assert ended.status == 2 and "--joints is 'stiff'" in ended.err
     frames = tmp_path / "frames"
     gvpipe.write(waving(4, 5), frames / "%02d.obj")
     gvpipe.write(waving(3, 4), frames / "%02d.obj", 5)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Bool, Float32, Float64, Int64, UInt16
+from gvpipe.foundation.arrays import Array, Bool, Float32, Float64, Int32, Int64, UInt16
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
@@ -26,7 +26,7 @@ from gvpipe.io.gltf.meshopt.writing import pack_quaternions
 from gvpipe.io.gltf.quantizing import Lattice, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
-from gvpipe.io.scene.affine_nodes import PER_FRAME, AffineNodes, Keys, find_keys, moves
+from gvpipe.io.scene.affine_nodes import AffineNodes, Keys, find_keys, moves
 from gvpipe.model.clips import Clip
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin, extent_of
@@ -86,8 +86,12 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     written = write_scene(glb, prepared, positions, shown, is_skinned=True)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
-    numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
-    root = glb.append("nodes", {"name": "skeleton", "children": [outer for outer, _ in numbers], **prepared.place})
+    if skin.parents is None:
+        numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
+        tops = [outer for outer, _ in numbers]
+    else:
+        numbers, tops = _write_tree(glb, keys.nodes, skin.parents)
+    root = glb.append("nodes", {"name": "skeleton", "children": tops, **prepared.place})
     inverse = glb.array(_inverse_binds(keys.pivots, lattice))
     glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root, "inverseBindMatrices": inverse})
     glb.tree["scenes"][0]["nodes"].append(root)
@@ -141,22 +145,34 @@ def _as_fractions(weights: Float32) -> UInt16:
     return rounded.astype(np.uint16)
 
 
-def _write_joint(glb: Glb, nodes: AffineNodes, j: int) -> tuple[int, int]:
-    """The two nodes of a joint as they are in the first frame: the outer one, and the joint itself below it."""
-    inner = glb.append("nodes", {"name": f"joint_{j}", "rotation": _plain(nodes.inner[0, j])})
-    first = {
+def _write_tree(glb: Glb, nodes: AffineNodes, parents: Int32) -> tuple[list[tuple[int, int]], list[int]]:
+    """Joints that have parents, a node each, as they are in the first frame: each node twice, and those of the roots."""
+    first = len(glb.tree["nodes"])
+    for j in range(len(parents)):
+        below = [first + int(child) for child in np.flatnonzero(parents == j)]
+        glb.append("nodes", {"name": f"joint_{j}"} | ({"children": below} if below else {}) | _placed(nodes, j))
+    return [(first + j, first + j) for j in range(len(parents))], [first + int(j) for j in np.flatnonzero(parents < 0)]
+
+
+def _placed(nodes: AffineNodes, j: int) -> Json:
+    return {
         "translation": _plain(nodes.translations[0, j]),
         "rotation": _plain(nodes.rotations[0, j]),
         "scale": _plain(nodes.scales[0, j]),
     }
-    return glb.append("nodes", {"name": f"joint_{j}_frame", "children": [inner], **first}), inner
+
+
+def _write_joint(glb: Glb, nodes: AffineNodes, j: int) -> tuple[int, int]:
+    """The two nodes of a joint as they are in the first frame: the outer one, and the joint itself below it."""
+    inner = glb.append("nodes", {"name": f"joint_{j}", "rotation": _plain(nodes.inner[0, j])})
+    return glb.append("nodes", {"name": f"joint_{j}_frame", "children": [inner], **_placed(nodes, j)}), inner
 
 
 def _write_keys(
     glb: Glb, fps: float, name: str, keys: Keys, rest: AffineNodes, numbers: list[tuple[int, int]], extent: float
 ) -> None:
     """Add an animation: keys of what moves, or is not as at rest ``(J, ...)``; one that is, has keys of its first joint."""
-    times = (np.arange(len(keys.is_key)) / (PER_FRAME * fps)).astype(np.float32)[:, None]
+    times = (np.arange(len(keys.is_key)) / (keys.per_frame * fps)).astype(np.float32)[:, None]
     samplers: list[Json] = []
     channels: list[Json] = []
     known: dict[bytes, int] = {}  # times are written once for all joints that share them

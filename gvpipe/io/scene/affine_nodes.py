@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Bool, Float64, Int64
+from gvpipe.foundation.arrays import Array, Bool, Float64, Int32, Int64
 from gvpipe.model.skin import Skin, extent_of, joint_means
 
 BLOCK = 32  # joints that are looked at together; what that takes is many times their matrices
@@ -48,7 +48,7 @@ class Keys(NamedTuple):
     """When each joint has a key.
 
     Args:
-        nodes: at all moments, `PER_FRAME` of them from each frame to the next; they move points relative to the pivots.
+        nodes: at all moments, ``per_frame`` of them from each frame to the next; they move points relative to the pivots.
         is_key: ``(G, J)``; the first and the last moment always are.
         pivots: ``(J, 3)``: the middle of what follows each joint, so that a turn about it moves little else.
         reach: ``(J,)``: how far from its pivot a vertex that follows a joint is, at most.
@@ -60,13 +60,19 @@ class Keys(NamedTuple):
     pivots: Float64
     reach: Float64
     precision: float
+    per_frame: int = PER_FRAME
 
 
 def find_keys(skin: Skin) -> Keys:
-    """The nodes and keys of a skin's joints: few where players find what lies between, more where they would not."""
+    """The nodes and keys of a skin's joints: few where players find what lies between, more where they would not.
+
+    Joints that have parents are relative to these, and have keys at frames alone: players turn them as bones turn.
+    """
     pivots = joint_pivots(skin)
     diagonal = extent_of(skin.bind)
     at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
+    if skin.parents is not None:
+        return _find_tree_keys(skin, skin.parents, pivots, diagonal * at_frames)
     corners = _corners(skin, pivots)
     tolerances = diagonal * at_frames, diagonal * max(BETWEEN, at_frames)
     found = []
@@ -74,23 +80,55 @@ def find_keys(skin: Skin) -> Keys:
         own = slice(first, first + BLOCK)
         moments = _between_frames(moved_to(skin.transforms[:, own], pivots[own]))
         nodes = factor(moments)
-        found.append((nodes, _choose(nodes, moments, corners[own], tolerances)))
+        frames = moments[::PER_FRAME]
+        steps = _farthest(frames[1:] - frames[:-1], corners[own])  # (F - 1, J) from a frame to the next
+        allowed = np.full(moments.shape[:2], tolerances[0])
+        for k in range(1, PER_FRAME):
+            allowed[k::PER_FRAME] = np.maximum(tolerances[1], OF_STEP * steps)
+        found.append((nodes, _choose(nodes, moments, corners[own], allowed)))
     nodes = AffineNodes(*(np.concatenate(parts, axis=1) for parts in zip(*(one for one, _ in found), strict=True)))
     is_key = np.concatenate([one for _, one in found], axis=1)
     reach = np.linalg.norm(corners[:, :, :3], axis=2).max(axis=1)
     return Keys(nodes, is_key, pivots, reach, tolerances[0])
 
 
-def _choose(nodes: AffineNodes, moments: Float64, corners: Float64, tolerances: tuple[float, float]) -> Bool:
-    """``(G, J)``: where joints have keys; ``tolerances`` are distances at frames and between them.
+def _find_tree_keys(skin: Skin, parents: Int32, pivots: Float64, precision: float) -> Keys:
+    """As `find_keys`. What a joint is off by moves all that hangs on it, so that a chain shares the precision."""
+    placed = moved_to(skin.transforms, pivots)
+    above = np.where(parents[None, :, None, None] >= 0, placed[:, np.maximum(parents, 0)], np.eye(4))
+    local: Float64 = np.asarray(np.linalg.solve(above, placed), np.float64)
+    order, depth = _from_roots(parents)
+    boxes = _corners(skin, np.zeros((skin.joints, 3)))[:, :, :3]
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    for j in order[::-1]:
+        if parents[j] >= 0:
+            low[parents[j]], high[parents[j]] = np.minimum(low[parents[j]], low[j]), np.maximum(high[parents[j]], high[j])
+    corners = np.stack([np.where(choice, high - pivots, low - pivots) for choice in product((False, True), repeat=3)], axis=1)
+    corners = np.concatenate([corners, np.ones((skin.joints, 8, 1))], axis=2)
+    nodes = factor(local)
+    shared = precision / (depth.max() + 1)
+    is_key = _choose(nodes, local, corners, np.full(local.shape[:2], shared))
+    reach = np.linalg.norm(corners[:, :, :3], axis=2).max(axis=1)
+    return Keys(nodes, is_key, pivots, reach, shared, 1)
+
+
+def _from_roots(parents: Int32) -> tuple[list[int], Int64]:
+    """Joints, each after its parent; and how many are above each."""
+    depth = np.full(len(parents), -1)
+    depth[parents < 0] = 0
+    order = np.flatnonzero(parents < 0).tolist()
+    for joint in order:  # grows
+        below = np.flatnonzero(parents == joint)
+        depth[below] = depth[joint] + 1
+        order.extend(below.tolist())
+    return order, depth
+
+
+def _choose(nodes: AffineNodes, moments: Float64, corners: Float64, allowed: Float64) -> Bool:
+    """``(G, J)``: where joints have keys, so that they are no farther off than ``allowed (G, J)``.
 
     Spans of `COARSEST` moments are halved, for each joint by itself, until it is near enough at all moments inside.
     """
-    frames = moments[::PER_FRAME]
-    steps = _farthest(frames[1:] - frames[:-1], corners)  # (F - 1, J) from a frame to the next
-    allowed = np.full(moments.shape[:2], tolerances[0])
-    for k in range(1, PER_FRAME):
-        allowed[k::PER_FRAME] = np.maximum(tolerances[1], OF_STEP * steps)
     last = len(moments) - 1
     is_key = np.zeros(moments.shape[:2], bool)
     is_key[::COARSEST] = is_key[-1] = True
@@ -112,7 +150,8 @@ def _choose(nodes: AffineNodes, moments: Float64, corners: Float64, tolerances: 
 
 def joint_pivots(skin: Skin) -> Float64:
     """``(J, 3)``: the middle of what follows each joint, as float32 has it."""
-    return joint_means(skin, skin.bind).astype(np.float32).astype(np.float64)
+    own = joint_means(skin, skin.bind) if skin.pivots is None else skin.pivots
+    return own.astype(np.float32).astype(np.float64)
 
 
 def moved_to(transforms: Float64, pivots: Float64) -> Float64:
