@@ -81,7 +81,7 @@ def test_body_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_site_s_video_shows_the_sample() -> None:
-    """It is of today's format, and as `gvpipe encode samples/creature.npz docs/creature.mp4` writes it."""
-    source, video = gvpipe.read(SAMPLES / "creature.npz"), gvpipe.open(DOCS / "creature.mp4")
+    """It is of today's format, and as `tools/make_gallery.py` writes it."""
+    source, video = gvpipe.read(SAMPLES / "creature.npz"), gvpipe.open(DOCS / "gallery" / "creature.mp4")
     assert video[:].shape == (source.n_frames, source.n_vertices, 3)
     assert np.abs(video[0] - source.read(0, 1)[0]).max() < 0.01

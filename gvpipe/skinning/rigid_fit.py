@@ -51,7 +51,7 @@ class Members(NamedTuple):
 
     @classmethod
     def of(cls, indices: Int32, weights: Float64, n_joints: int) -> Members:
-        """Of ``indices (V, 4)`` and ``weights (V, 4)``."""
+        """The members, given ``indices (V, 4)`` and ``weights (V, 4)``."""
         vertices, column = np.nonzero(weights)
         joints = indices[vertices, column]
         order = np.argsort(joints, kind="stable")
