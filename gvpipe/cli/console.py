@@ -102,7 +102,7 @@ compress_option = click.option(
     type=click.Choice(["none", "meshopt"]),
     default="none",
     show_default=True,
-    help="Of a .glb: EXT_meshopt_compression, for a tenth to a half of the bytes.",
+    help="Of a .glb: EXT_meshopt_compression, for a third to three quarters of the bytes.",
 )
 unlimited_option = click.option(
     "--unlimited",

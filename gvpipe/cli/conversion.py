@@ -86,7 +86,7 @@ def convert(
         read_clips,
         smaller_without,
     )
-    from gvpipe.io.writing import takes_skin
+    from gvpipe.io.writing import is_glb, takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
@@ -96,8 +96,10 @@ def convert(
     wanted = SkinOptions(number, target_kg, max_error, is_rigid)
     check_glb_options(target, skin, compress, wanted)
     if split:
-        if lod or start is not None or stop is not None or target == PIPE:
-            raise click.UsageError("--split goes with --frames, and not with --start, --stop, --lod or an OUTPUT of -")
+        if clip == ALL or lod or start is not None or stop is not None or target == PIPE:
+            raise click.UsageError(
+                "--split goes with --frames, and not with --clip all, --start, --stop, --lod or an OUTPUT of -"
+            )
         options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), "unlimited": unlimited}
         _convert_split(source, target, options, parts, wanted if skin else None, compress, out)
         return
@@ -109,8 +111,10 @@ def convert(
         )
         clips: tuple[Clip, ...] = ()
         if clip == ALL and (names := clip_names(given)):
-            if not skin or (first, last) != (0, None):
-                raise click.UsageError("--clip all is for --skin, and for whole clips: without --start, --stop and --frames")
+            if not (skin and is_glb(target)) or (first, last) != (0, None) or mesh is not None:
+                raise click.UsageError(
+                    "--clip all is for --skin, a .glb and whole clips: without --start, --stop, --frames, --mesh"
+                )
             some, clips = read_clips(names, lambda name, rate: files.read(given, rate, name), fps)
             start, stop = 0, len(some)
         elif frames is not None:

@@ -47,11 +47,11 @@ def parse_joints(text: str | None) -> tuple[int, bool]:
         >>> parse_joints("64"), parse_joints("rigid"), parse_joints("rigid:24"), parse_joints(None)
         ((64, False), (0, True), (24, True), (0, False))
     """
-    kind, _, number = (text or "").rpartition(":") if ":" in (text or "") else ("", "", text or "")
-    if number == RIGID and not kind:
-        return 0, True
-    if kind in ("", RIGID) and (not text or (number.isascii() and number.removeprefix("-").isdigit())):
-        return int(number or 0), kind == RIGID
+    if text is None or text == RIGID:
+        return 0, text == RIGID
+    number = text.removeprefix(f"{RIGID}:")
+    if number.isascii() and number.removeprefix("-").isdigit():
+        return int(number), number != text
     raise click.UsageError(f"--joints is {text!r}; a number, rigid or rigid:NUMBER is needed")
 
 
@@ -87,7 +87,7 @@ def skin_of_video(player: Player, path: str, frames: tuple[int, int], wanted: bo
                 "gvpipe convert --skin, which finds one"
             )
         return None, ["written with morph targets, since the file has no skeleton; gvpipe convert --skin finds one"]
-    off = f"{100 * skin.error:.2g} % of the diagonal"
+    off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else "an unknown part of the diagonal"
     if wanted is None and not skin.error <= EXACT:
         return None, [f"written with morph targets, since the file's skeleton is up to {off} off (--skin takes it)"]
     how = "exact" if skin.error <= EXACT else f"up to {off} off"

@@ -62,6 +62,7 @@ def write(
     Raises:
         InputError: the path names no format that can be written, or none that has a skeleton or a compression.
         OutputError: a file cannot be written; nothing half-written is left.
+        SettingError: a compression that is not known.
     """
     path = os.fspath(path)
     check_target(path)

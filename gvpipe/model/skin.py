@@ -57,9 +57,29 @@ class Skin:
             raise InputError(f"a skin names joints {self.indices.min()}..{self.indices.max()}; there are {n_joints}")
         if not (np.isfinite(self.transforms).all() and np.isfinite(self.bind).all()):
             raise InputError("a skin's bind pose or transforms are not finite")
+        self._check_tree(n_joints)
+        for clip in self.clips:
+            if not 0 <= clip.start < clip.stop <= self.n_frames:
+                raise InputError(f"clip {clip.name!r} is of frames {clip.start}..{clip.stop}; the skin has {self.n_frames}")
         off = np.abs(self.weights.sum(axis=1, dtype=np.float64) - 1).max(initial=0)
         if not (self.weights.min(initial=0) >= 0 and off <= ROUNDING):
             raise InputError("a skin's weights are below 0, or do not add up to 1 at each vertex; divide them by their sum")
+
+    def _check_tree(self, n_joints: int) -> None:
+        if self.pivots is not None:
+            object.__setattr__(self, "pivots", np.asarray(self.pivots, np.float64))
+            if self.pivots.shape != (n_joints, 3) or not np.isfinite(self.pivots).all():
+                raise InputError(f"a skin's pivots are of shape {self.pivots.shape}, or not finite; ({n_joints}, 3) is needed")
+        if self.parents is None:
+            return
+        object.__setattr__(self, "parents", np.asarray(self.parents, np.int32))
+        above = self.parents
+        if above.shape != (n_joints,) or not (above.min(initial=-1) >= -1 and above.max(initial=-1) < n_joints):
+            raise InputError(f"a skin's parents are of shape {above.shape}, or none of its joints; -1 stands for none")
+        for _ in range(n_joints):
+            above = np.where(above >= 0, self.parents[above], -1)
+        if (above >= 0).any():
+            raise InputError("a skin's parents go round in a circle; one joint must have none")
 
     @property
     def joints(self) -> int:

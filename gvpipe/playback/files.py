@@ -96,7 +96,8 @@ def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | No
 
     With a ``skin`` of it (`gvpipe.skin`, `Player.skin`), a ``.glb`` has its skeleton in place of morph targets. Frames are
     then as the skeleton moves them. With ``compress="meshopt"`` a ``.glb`` is compressed (EXT_meshopt_compression): positions
-    have 16 bits, normals 8, keys what their error allows, and vertices and triangles another order.
+    that a skeleton moves have 16 bits where that will do, normals 8, keys what their error allows; vertices and triangles come
+    in another order.
 
     Returns notes: what the format cannot hold, a line each.
 

@@ -114,7 +114,8 @@ def fit_skin(
 
 def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Progress, rigid: bool) -> Iterator[Skin]:
     kg, last = wanted.kg if wanted.kg is not None else DEFAULT_KG, 0
-    tries = ((joints, 1.0),) if joints else ((0, 1.0 if rigid else LOOSE), (0, 1.0), *((count, 1.0) for count in MORE))
+    begun = ((0, 1.0),) if rigid else ((0, LOOSE), (0, 1.0))
+    tries = ((joints, 1.0),) if joints else (*begun, *((count, 1.0) for count in MORE))
     for count, factor in tries:
         if 0 < count <= last:
             continue

@@ -13,6 +13,7 @@ moves least against its parent.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -33,6 +34,8 @@ SWEEPS = 3  # over all joints, in each
 CANDIDATES = 8  # joints that a vertex may follow, of which four stay
 BLOCK = 1024  # vertices whose weights are fitted together
 OWN = 4.0  # times, what a vertex follows counts more than what a neighbour follows
+POINT = 1e-15  # mean squared distance from the middle, in diagonals: what has less is one point
+LEAST_SCALE = 1e-6
 PARTS = 4096  # of a weight: their sums are exact
 TOWARDS_MIDDLE = 1e-3  # of a pivot's energy, towards the middle of what two joints share
 
@@ -96,9 +99,11 @@ def make_rigid(skin: Skin, sequence: MeshSequence, report: Progress = silent) ->
         transforms[start : start + len(block), :, :3, :3] = linear
         transforms[start : start + len(block), :, :3, 3] = diagonal * np.swapaxes(own[..., 3], 0, 1) + centre - linear @ centre
     report("rigid skin", 1.0)
-    made = Skin(indices, weights.astype(np.float32), first, transforms)
+    used, numbers = np.unique(np.where(weights > 0, indices, indices[:, :1]), return_inverse=True)
+    renumbered: Int32 = np.where(weights > 0, numbers.reshape(indices.shape), 0).astype(np.int32)
+    made = Skin(renumbered, weights.astype(np.float32), first, transforms[:, used])
     parents, pivots = _tie(made)
-    return Skin(indices, made.weights, first, transforms, parents=parents, pivots=pivots)
+    return replace(made, parents=parents, pivots=pivots)
 
 
 def _begin(bind: Float64, frames: Float64, members: Members) -> Float64:
@@ -144,8 +149,8 @@ def similar(points: Float64, weights: Float64, targets: Float64) -> Float64:
     signs = np.ones_like(d)
     signs[:, 2] = np.where(np.linalg.det(u @ vt) < 0, -1.0, 1.0)
     size = float(share @ np.square(around).sum(axis=1))
-    scale = (signs * d).sum(axis=1) / size if size > 0 else np.zeros(len(d))
-    scale = np.where(scale > 0, scale, 1.0)
+    # what is one point here has no size to grow; what becomes one keeps a size that others can hang on
+    scale = np.maximum((signs * d).sum(axis=1) / size, LEAST_SCALE) if size > POINT else np.ones(len(d))
     linear = scale[:, None, None] * ((u * signs[:, None, :]) @ vt)
     return np.concatenate([linear, (middles - linear @ middle)[:, :, None]], axis=2)
 
@@ -213,7 +218,7 @@ def _solve(gram: Float64, given: Float64, is_in: Bool) -> Float64:
 def _tie(skin: Skin) -> tuple[Int32, Float64]:
     """The parent ``(J,)`` of each joint, -1 for roots, and the points ``(J, 3)`` that they turn about.
 
-    Joints that share most are tied: a spanning tree. Its roots are the joints that move most.
+    Joints that share most are tied: a spanning tree. Its roots are those that vertices follow most.
     """
     from scipy import sparse
     from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree

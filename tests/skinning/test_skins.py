@@ -311,6 +311,32 @@ def test_rigid_joints_turn_and_hang_together(tmp_path: Path) -> None:
     assert farthest(shown, skin.read(0, 20)[[0, 10]]) < max(1e-5, 0.02 * skin.error)
 
 
+def test_rigid_parts_that_vanish_for_a_while(tmp_path: Path) -> None:
+    """A part at one point, as hidden ones are: its joint stays one on which others can hang, and nothing flies off."""
+    arm = bent_arm()
+    frames = arm.read(0, 20)
+    n = frames.shape[1]
+    piece = frames[:, : n // 3] + np.array([0, 0, 0.5], np.float32)
+    piece[5:10] = piece[5:10, :1]
+    faces = arm.faces[(arm.faces < n // 3).all(axis=1)]
+    both = np.concatenate([arm.faces, faces + n]).astype(np.int32)
+    sequence = replace(arm, positions=np.concatenate([frames, piece], axis=1), faces=both)
+    skin = gvpipe.skin(sequence, joints=6, rigid=True)
+    gvpipe.write(sequence, tmp_path / "a.glb", skin=skin)
+    read, own = gvpipe.read(tmp_path / "a.glb"), skin.read(0, 20)
+    assert farthest(read.read(0, 20), own) < max(1e-5, 0.03 * skin.error)
+    halves = read_poses(tmp_path / "a.glb").at(np.asarray((np.arange(19) + 0.5) / sequence.fps, np.float64))
+    low, high = own.min(axis=(0, 1)), own.max(axis=(0, 1))
+    assert (halves > low - (high - low)).all() and (halves < high + (high - low)).all()
+
+
+def test_one_frame_of_a_skeleton(tmp_path: Path) -> None:
+    for rigid_joints in (False, True):
+        skin = gvpipe.skin(bent_arm(), joints=3, rigid=rigid_joints).part(7, 8)
+        gvpipe.write(bent_arm().part(7, 8), tmp_path / "a.glb", skin=skin)
+        assert farthest(gvpipe.read(tmp_path / "a.glb").read(0, 1), skin.read(0, 1)) < 1e-4
+
+
 def test_rigid_joints_lie_at_the_hinges() -> None:
     sequence = bent_arm()
     skin = gvpipe.skin(sequence, joints=3, rigid=True)
@@ -379,7 +405,10 @@ def test_all_clips_have_one_skeleton(tmp_path: Path, run: Any) -> None:
     ended = run("convert", path, tmp_path / "b.glb", "--clip", "all")
     assert ended.status == 2 and "--clip all is for --skin" in ended.err
     ended = run("convert", path, tmp_path / "b.usdc", "--skin", "--clip", "all")
-    assert ended.status == 1 and "USD has one animation" in ended.err
+    assert ended.status == 2 and "--clip all is for --skin, a .glb" in ended.err
+    with pytest.raises(InputError, match="USD has one animation"):
+        one = waving(3, 4)
+        gvpipe.write(one, tmp_path / "b.usdc", skin=replace(gvpipe.skin(one), clips=(Clip("a", 0, 1), Clip("b", 1, 4))))
     assert not list(tmp_path.glob("b.*"))
 
 
@@ -441,6 +470,13 @@ def test_what_is_refused(tmp_path: Path) -> None:
             replace(skin, weights=size * skin.weights)
     with pytest.raises(InputError, match="not finite"):
         replace(skin, transforms=skin.transforms * np.nan)
+    for parents in ([0] * skin.joints, [skin.joints] * skin.joints, [-1]):
+        with pytest.raises(InputError, match="a skin's parents"):
+            replace(skin, parents=np.array([*parents], np.int32))
+    with pytest.raises(InputError, match="pivots"):
+        replace(skin, pivots=np.zeros((1, 2)))
+    with pytest.raises(InputError, match="clip 'a' is of frames"):
+        replace(skin, clips=(Clip("a", 0, 99),))
     for joints in (-1, 1025):
         with pytest.raises(SettingError, match="joints is"):
             gvpipe.skin(sequence, joints=joints)

@@ -1,8 +1,8 @@
 """Sequences as GLB with a skeleton: the bind pose once, and keys of the joints.
 
-A joint's motion is affine. It is two nodes (`gvpipe.io.scene.affine_nodes`), so that it is exact in every engine that
-multiplies matrices down the tree. Inverse bind matrices take positions to the joints' pivots. The meshes are roots, as glTF
-wants skinned ones; one node above all joints turns and scales the scene.
+A joint's motion is affine: two nodes (`gvpipe.io.scene.affine_nodes`), so that it is exact in every engine that multiplies
+matrices down the tree. Or it is rigid, and one node below its parent's. Inverse bind matrices take positions to the joints'
+pivots. The meshes are roots, as glTF wants skinned ones; one node above all joints turns and scales the scene.
 
 A packed file has positions of 16 bits, whose lattice the inverse bind matrices undo, and keys as fine as they need to be.
 
@@ -23,7 +23,7 @@ from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import Filtered, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.meshopt.writing import pack_quaternions
-from gvpipe.io.gltf.quantizing import Lattice, steps_of
+from gvpipe.io.gltf.quantizing import FULL, Lattice, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
 from gvpipe.io.scene.affine_nodes import AffineNodes, Keys, find_keys, moves
@@ -31,7 +31,6 @@ from gvpipe.model.clips import Clip
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin, extent_of
 
-FULL = 65535  # a weight of 1
 MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
 STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
 QUATERNION_BITS, LEAST_BITS = 16, 4
@@ -195,7 +194,7 @@ def _write_keys(
             (outer, "scale", keys.nodes.scales, rest.scales, STANDS, scaled),
             (inner, "rotation", keys.nodes.inner, rest.inner, STANDS, turned),
         ):
-            if moves(values[:, j], still[j], tolerance):
+            if (node != outer or values is not keys.nodes.inner) and moves(values[:, j], still[j], tolerance):
                 add(node, path, keys.is_key[:, j], values[:, j], step)
     if not channels:
         add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0], keys.precision)

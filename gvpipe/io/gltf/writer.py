@@ -23,6 +23,7 @@ from gvpipe.io.gltf.quantizing import steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, normals_of, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.skin import extent_of
 
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
 ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much
@@ -116,7 +117,7 @@ def _write_animation(glb: Glb, prepared: Prepared) -> int:
     sequence, sources = prepared.sequence, prepared.split.sources
     first = sequence.read(0, 1)[0]
     base, normals = first[sources], normals_of(prepared, 0, first)
-    step = EXACT * float(np.linalg.norm(np.ptp(first.astype(np.float64), axis=0)))
+    step = EXACT / 2 * extent_of(first)  # of the base and of what targets add to it
     scene = write_scene(glb, prepared, base, () if normals is None else (normals,), step=step)
     if sequence.n_frames == 1:
         return 0

@@ -51,7 +51,7 @@ class Keys(NamedTuple):
         nodes: at all moments, ``per_frame`` of them from each frame to the next; they move points relative to the pivots.
         is_key: ``(G, J)``; the first and the last moment always are.
         pivots: ``(J, 3)``: the middle of what follows each joint, so that a turn about it moves little else.
-        reach: ``(J,)``: how far from its pivot a vertex that follows a joint is, at most.
+        reach: ``(J,)``: how far from its pivot a vertex that follows a joint, or hangs on it, is in the bind pose, at most.
         precision: how far off a joint may be at frames, as a distance.
     """
 
@@ -93,7 +93,10 @@ def find_keys(skin: Skin) -> Keys:
 
 
 def _find_tree_keys(skin: Skin, parents: Int32, pivots: Float64, precision: float) -> Keys:
-    """As `find_keys`. What a joint is off by moves all that hangs on it, so that a chain shares the precision."""
+    """As `find_keys`. What a joint is off by moves all that hangs on it, so that a chain shares the precision.
+
+    Where a parent grows, what its child is off by grows with it.
+    """
     placed = moved_to(skin.transforms, pivots)
     above = np.where(parents[None, :, None, None] >= 0, placed[:, np.maximum(parents, 0)], np.eye(4))
     local: Float64 = np.asarray(np.linalg.solve(above, placed), np.float64)
@@ -106,7 +109,8 @@ def _find_tree_keys(skin: Skin, parents: Int32, pivots: Float64, precision: floa
     corners = np.stack([np.where(choice, high - pivots, low - pivots) for choice in product((False, True), repeat=3)], axis=1)
     corners = np.concatenate([corners, np.ones((skin.joints, 8, 1))], axis=2)
     nodes = factor(local)
-    shared = precision / (depth.max() + 1)
+    grown = float(np.cbrt(np.abs(np.linalg.det(above[..., :3, :3]))).max(initial=1.0))
+    shared = precision / (depth.max() + 1) / grown
     is_key = _choose(nodes, local, corners, np.full(local.shape[:2], shared))
     reach = np.linalg.norm(corners[:, :, :3], axis=2).max(axis=1)
     return Keys(nodes, is_key, pivots, reach, shared, 1)
@@ -132,6 +136,8 @@ def _choose(nodes: AffineNodes, moments: Float64, corners: Float64, allowed: Flo
     last = len(moments) - 1
     is_key = np.zeros(moments.shape[:2], bool)
     is_key[::COARSEST] = is_key[-1] = True
+    if not last:
+        return is_key
     step = COARSEST
     while step > 1:
         starts = np.arange(0, last, step)

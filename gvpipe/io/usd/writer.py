@@ -30,6 +30,7 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
 ROOT = "root"  # of meshes that have no common node
+FLAT_TREE = "joints are written side by side; which is below which is left out (a .glb has it)"
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
 
@@ -123,6 +124,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
         _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
     else:
         write_skeleton(stage, f"/{root}", skin, list(zip(drawn, meshes, strict=True)), start, name)
+        said += [FLAT_TREE] if skin.parents is not None else []
         said += _write_bind_normals(sequence, list(zip(drawn, meshes, strict=True)), normals, is_first_frame(skin))
         if sequence.origin.any():
             UsdGeom.Xformable(top).AddTranslateOp().Set(Gf.Vec3d(*sequence.origin.tolist()))
