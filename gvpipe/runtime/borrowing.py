@@ -12,9 +12,6 @@ Source: numba's documentation, "Customizing the Compiler", and its class `numba.
 
 from __future__ import annotations
 
-import contextlib
-import gc
-from collections.abc import Iterator
 from typing import Any
 
 from numba.core import cgutils
@@ -69,11 +66,6 @@ class _BorrowingLowering(BaseNativeLowering):  # type: ignore[misc]
 class BorrowingCompiler(CompilerBase):  # type: ignore[misc]
     """numba's compiler, but that arguments are borrowed."""
 
-    def compile_extra(self, function: Any) -> Any:
-        """Compile a function, and those that it calls."""
-        with _no_collection():
-            return super().compile_extra(function)
-
     def define_pipelines(self) -> list[Any]:
         """The steps of compiling."""
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -84,19 +76,3 @@ class BorrowingCompiler(CompilerBase):  # type: ignore[misc]
         steps.passes = [(_BorrowingLowering if step is NativeLowering else step, why) for step, why in steps.passes]
         steps.finalize()
         return [steps]
-
-
-@contextlib.contextmanager
-def _no_collection() -> Iterator[None]:
-    """Let Python's search for circular garbage rest: compiling makes millions of objects, and a tenth of its time goes there.
-
-    numba compiles one function at a time, whatever the threads; a function that another one calls is compiled within it.
-    """
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
