@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Bool, Float64, Int32, Int64
+from gvpipe.foundation.arrays import Bool, Float64, Floats, Int32, Int64
 from gvpipe.foundation.progress import Progress, silent
 from gvpipe.mesh.topology import adjacency
 from gvpipe.metrics.vertex_errors import frame_diagonal
@@ -159,12 +159,8 @@ def _fit_weights(
     motions: Float64, bind: Float64, frames: Float64, around: sparse.csr_array, indices: Int32, weights: Float64
 ) -> tuple[Int32, Float64]:
     """Step 2: joints and weights ``(V, 4)`` of every vertex."""
-    from scipy import sparse
-
-    n, n_joints = len(bind), len(motions)
-    rows = np.repeat(np.arange(n), INFLUENCES)
-    followed = sparse.coo_array((weights.ravel(), (rows, indices.ravel())), shape=(n, n_joints)).tocsr()
-    near = sparse.csr_array(around @ followed + OWN * followed)
+    n, followed = len(bind), _followed(indices, weights, len(motions))
+    near = (around @ followed + OWN * followed).tocsr()
     found, parts = np.zeros((n, INFLUENCES), np.int32), np.zeros((n, INFLUENCES))
     for first in range(0, n, BLOCK):
         own = slice(first, min(first + BLOCK, n))
@@ -184,6 +180,15 @@ def _fit_weights(
         parts[own] = rounded / PARTS
         found[own] = np.where(rounded > 0, np.take_along_axis(candidates, best, axis=1), 0)
     return found, parts
+
+
+def _followed(indices: Int32, weights: Floats, n_joints: int) -> sparse.csr_array:
+    """``(V, J)``: how much each vertex follows each joint."""
+    from scipy import sparse
+
+    n = len(indices)
+    rows = np.repeat(np.arange(n), INFLUENCES)
+    return sparse.coo_array((weights.ravel(), (rows, indices.ravel())), shape=(n, n_joints)).tocsr()
 
 
 def _sparse_weights(gram: Float64, given: Float64, is_in: Bool) -> Float64:
@@ -223,9 +228,7 @@ def _tie(skin: Skin) -> tuple[Int32, Float64]:
     from scipy import sparse
     from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
-    n = len(skin.bind)
-    rows = np.repeat(np.arange(n), INFLUENCES)
-    followed = sparse.coo_array((skin.weights.ravel(), (rows, skin.indices.ravel())), shape=(n, skin.joints)).tocsr()
+    followed = _followed(skin.indices, skin.weights, skin.joints)
     shared = (followed.T @ followed).toarray()
     sums = shared.sum(axis=1)
     np.fill_diagonal(shared, 0)

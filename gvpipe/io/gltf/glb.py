@@ -111,16 +111,17 @@ class Glb:
 
     def _packed_view(self, rows: UInt8, target: int | None, stride: int | None, filtered: Filtered | None) -> int:
         """Add a view of ``rows (n, bytes)`` in compressed form, or as it is where that is smaller."""
-        is_triangles = target == INDICES
-        if is_triangles:
-            packed = encode_triangles(rows.reshape(-1).view(f"<u{rows.shape[1]}"))
+        if target == INDICES:
+            mode, packed = "TRIANGLES", encode_triangles(rows.reshape(-1).view(f"<u{rows.shape[1]}"))
         elif rows.shape[1] % 4 == 0:
-            packed = encode_attributes(rows if filtered is None else filtered.elements)
-        if (not is_triangles and rows.shape[1] % 4) or (filtered is None and len(packed) >= rows.size):
+            mode, packed = "ATTRIBUTES", encode_attributes(rows if filtered is None else filtered.elements)
+        else:
+            return self.view(rows.tobytes(), target, stride)
+        if filtered is None and len(packed) >= rows.size:
             return self.view(rows.tobytes(), target, stride)
         self.use(MESHOPT, is_required=True)
         own: Json = {"buffer": 0, "byteOffset": self._put(packed), "byteLength": len(packed)}
-        own |= {"byteStride": rows.shape[1], "count": len(rows), "mode": "TRIANGLES" if is_triangles else "ATTRIBUTES"}
+        own |= {"byteStride": rows.shape[1], "count": len(rows), "mode": mode}
         own |= {"filter": filtered.name} if filtered else {}
         item: Json = {"buffer": 1, "byteOffset": self._unpacked, "byteLength": rows.size}
         item |= {"byteStride": rows.shape[1]} if target == VERTICES else {}
@@ -132,8 +133,9 @@ class Glb:
         """As `array`, for the many small arrays of an animation: those of one type share a view."""
         item = self._accessor(values, bounds) | ({"normalized": True} if normalized else {})
         number = self.append("accessors", item)
-        rows = filtered.elements if filtered and self.is_packed else _bytes_of(values)
-        key = values.dtype.str, values.shape[1], filtered.name if filtered and self.is_packed else ""
+        filtered = filtered if self.is_packed else None
+        rows = filtered.elements if filtered else _bytes_of(values)
+        key = values.dtype.str, values.shape[1], filtered.name if filtered else ""
         self._blocks.setdefault(key, []).append((number, rows))
         return number
 

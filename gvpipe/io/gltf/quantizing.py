@@ -16,52 +16,21 @@ Source: Khronos, KHR_mesh_quantization; EXT_meshopt_compression, appendix B (fil
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Float32, Float64, UInt16
+from gvpipe.foundation.arrays import Array
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.glb import Filtered
 from gvpipe.io.gltf.meshopt.writing import MANTISSA, pack_floats, pack_unit_vectors
 
 EXTENSION = "KHR_mesh_quantization"
-FULL = 65535
+POSITION_BITS = 16
+FULL = (1 << POSITION_BITS) - 1
+EXACT = 5e-6  # of the diagonal: what rounding may add where nothing else is off
 NORMAL_BITS = 8
 UV_STEP = 2.0**-16
 LEAST_STEP = 2.0**-120  # finer ones lie below what float32 has in full
-
-
-class Lattice(NamedTuple):
-    """Integers of 16 bits for positions: ``low + step * integer``.
-
-    Args:
-        low: ``(3,)`` the smallest position of each axis.
-        step: the same for all axes, more than 0.
-    """
-
-    low: Float64
-    step: float
-
-    @classmethod
-    def around(cls, points: Array) -> Lattice:
-        """The finest one that holds ``points (n, 3)``."""
-        low = points.min(axis=0).astype(np.float64)
-        return cls(low, float((points.max(axis=0) - low).max()) / FULL or 1.0)
-
-    def integers(self, points: Array) -> UInt16:
-        """The nearest integers to ``points (n, 3)``."""
-        return np.rint((points - self.low) / self.step).astype(np.uint16)
-
-    def positions(self, points: Array) -> Float32:
-        """The positions ``(n, 3)`` that stand for ``points (n, 3)``."""
-        return (self.low + self.step * self.integers(points)).astype(np.float32)
-
-    def matrix(self) -> Float64:
-        """``(4, 4)`` that takes integers to positions."""
-        result = np.diag([self.step, self.step, self.step, 1.0])
-        result[:3, 3] = self.low
-        return result
 
 
 def steps_of(values: Array, step: float) -> Filtered | None:

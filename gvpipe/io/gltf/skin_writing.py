@@ -22,19 +22,19 @@ from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import Filtered, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
-from gvpipe.io.gltf.meshopt.writing import pack_quaternions
-from gvpipe.io.gltf.quantizing import FULL, Lattice, steps_of
+from gvpipe.io.gltf.meshopt.writing import QUATERNION_BITS, pack_quaternions
+from gvpipe.io.gltf.quantizing import EXACT, FULL, POSITION_BITS, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
 from gvpipe.io.scene.affine_nodes import AffineNodes, Keys, find_keys, moves
+from gvpipe.mesh.lattice import Lattice
 from gvpipe.model.clips import Clip
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin, extent_of
 
 MAX_JOINTS = 1 << 16  # numbers of joints have 16 bits
 STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a translation: what differs by less stands still
-QUATERNION_BITS, LEAST_BITS = 16, 4
-EXACT = 5e-6  # of the diagonal: what rounding may add where a skin is exact
+LEAST_BITS = 4  # of quaternions
 COMPARED = 16  # frames, of those that lie evenly, and of those where joints are farthest from rest
 TINY, FLAT = 1e-100, 1e-6  # FLAT: of a cube's volume
 ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
@@ -78,10 +78,14 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     if normals is not None:
         normals = replace(normals, values=_to_bind(skin, sources, normals.values))
     shown = influences if normals is None else (normals, *influences)
-    lattice = Lattice.around(skin.bind) if glb.is_packed else None
-    if lattice is not None and _farthest(skin, replace(skin, bind=lattice.positions(skin.bind))) > limit:
-        lattice = None
-    positions: Array = skin.bind[sources] if lattice is None else lattice.integers(skin.bind[sources])
+    lattice = Lattice.over(skin.bind, POSITION_BITS) if glb.is_packed else None
+    positions: Array = skin.bind[sources]
+    if lattice is not None:
+        integers = lattice.quantise(skin.bind)
+        if _farthest(skin, replace(skin, bind=lattice.points_at(integers).astype(np.float32))) <= limit:
+            positions = integers[sources].astype(np.uint16)
+        else:
+            lattice = None
     written = write_scene(glb, prepared, positions, shown, is_skinned=True)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
@@ -117,8 +121,9 @@ def _farthest(skin: Skin, other: Skin) -> float:
 
 def _inverse_binds(pivots: Float64, lattice: Lattice | None) -> Float32:
     """``(J, 16)``, each by columns: from the file's positions to those about each joint's pivot."""
-    result = np.tile(np.eye(4) if lattice is None else lattice.matrix(), (len(pivots), 1, 1))
-    result[:, :3, 3] -= pivots
+    step, origin = (1.0, np.zeros(3)) if lattice is None else (lattice.step, np.array(lattice.origin))
+    result = np.tile(np.diag([step, step, step, 1.0]), (len(pivots), 1, 1))
+    result[:, :3, 3] = origin - pivots
     return np.swapaxes(result, 1, 2).reshape(-1, 16).astype(np.float32)
 
 
@@ -188,13 +193,15 @@ def _write_keys(
         reach = max(float(keys.reach[j]), STANDS * extent, TINY)
         scaled = keys.precision / reach
         turned = scaled / max(1.0, float(np.abs(keys.nodes.scales[:, j]).max()))  # an angle
-        for node, path, values, still, tolerance, step in (
+        moved = [
             (outer, "translation", keys.nodes.translations, rest.translations, STANDS * extent, keys.precision),
             (outer, "rotation", keys.nodes.rotations, rest.rotations, STANDS, turned),
             (outer, "scale", keys.nodes.scales, rest.scales, STANDS, scaled),
-            (inner, "rotation", keys.nodes.inner, rest.inner, STANDS, turned),
-        ):
-            if (node != outer or values is not keys.nodes.inner) and moves(values[:, j], still[j], tolerance):
+        ]
+        if inner != outer:
+            moved.append((inner, "rotation", keys.nodes.inner, rest.inner, STANDS, turned))
+        for node, path, values, still, tolerance, step in moved:
+            if moves(values[:, j], still[j], tolerance):
                 add(node, path, keys.is_key[:, j], values[:, j], step)
     if not channels:
         add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0], keys.precision)

@@ -19,7 +19,7 @@ from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import VERTICES, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.normal_writing import NORMAL
-from gvpipe.io.gltf.quantizing import steps_of
+from gvpipe.io.gltf.quantizing import EXACT, steps_of
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, normals_of, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.model.sequence import MeshSequence
@@ -27,7 +27,6 @@ from gvpipe.model.skin import extent_of
 
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
 ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much
-EXACT = 5e-6  # of the diagonal: how far off positions of packed files may be
 NORMAL_STEP = 1 / 1024  # of what targets of packed files add to normals
 SMALL_INTEGERS = ("float32", "int8", "uint8", "int16", "uint16")
 
@@ -61,7 +60,7 @@ def write_animated(sequence: MeshSequence, path: Path, is_packed: bool = False) 
     Args:
         sequence: to be written.
         path: of the ``.glb``.
-        is_packed: compressed by EXT_meshopt_compression, positions within `EXACT`.
+        is_packed: compressed by EXT_meshopt_compression, positions within `quantizing.EXACT`.
 
     Raises:
         InputError: it would be longer than a GLB can be.

@@ -73,7 +73,7 @@ def find_keys(skin: Skin) -> Keys:
     at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
     if skin.parents is not None:
         return _find_tree_keys(skin, skin.parents, pivots, diagonal * at_frames)
-    corners = _corners(skin, pivots)
+    corners = _corners(*_boxes(skin), pivots)
     tolerances = diagonal * at_frames, diagonal * max(BETWEEN, at_frames)
     found = []
     for first in range(0, skin.joints, BLOCK):
@@ -101,14 +101,11 @@ def _find_tree_keys(skin: Skin, parents: Int32, pivots: Float64, precision: floa
     above = np.where(parents[None, :, None, None] >= 0, placed[:, np.maximum(parents, 0)], np.eye(4))
     local: Float64 = np.asarray(np.linalg.solve(above, placed), np.float64)
     order, depth = _from_roots(parents)
-    boxes = _corners(skin, np.zeros((skin.joints, 3)))[:, :, :3]
-    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    low, high = _boxes(skin)
     for j in order[::-1]:
         if parents[j] >= 0:
             low[parents[j]], high[parents[j]] = np.minimum(low[parents[j]], low[j]), np.maximum(high[parents[j]], high[j])
-    corners = np.stack([np.where(choice, high - pivots, low - pivots) for choice in product((False, True), repeat=3)], axis=1)
-    corners = np.concatenate([corners, np.ones((skin.joints, 8, 1))], axis=2)
-    nodes = factor(local)
+    corners, nodes = _corners(low, high, pivots), factor(local)
     grown = float(np.cbrt(np.abs(np.linalg.det(above[..., :3, :3]))).max(initial=1.0))
     shared = precision / (depth.max() + 1) / grown
     is_key = _choose(nodes, local, corners, np.full(local.shape[:2], shared))
@@ -184,17 +181,22 @@ def _between_frames(transforms: Float64) -> Float64:
     return result
 
 
-def _corners(skin: Skin, pivots: Float64) -> Float64:
-    """``(J, 8, 4)``: corners of the box around the vertices that follow each joint, relative to its pivot, with a 1."""
+def _boxes(skin: Skin) -> tuple[Float64, Float64]:
+    """Lowest and highest coordinates ``(J, 3)`` of the vertices that follow each joint; infinite where none does."""
     low, high = np.full((skin.joints, 3), np.inf), np.full((skin.joints, 3), -np.inf)
     vertices, column = np.nonzero(skin.weights)
     joints = skin.indices[vertices, column]
     np.minimum.at(low, joints, skin.bind[vertices])
     np.maximum.at(high, joints, skin.bind[vertices])
+    return low, high
+
+
+def _corners(low: Float64, high: Float64, pivots: Float64) -> Float64:
+    """``(J, 8, 4)``: corners of each joint's box, relative to its pivot, with a 1; at the pivot where a box is infinite."""
     is_used = np.isfinite(low[:, :1])
     box = np.stack([np.where(is_used, low - pivots, 0), np.where(is_used, high - pivots, 0)])  # (2, J, 3)
     return np.stack(
-        [np.stack([*(box[choice[axis], :, axis] for axis in range(3)), np.ones(skin.joints)], axis=1)
+        [np.stack([*(box[choice[axis], :, axis] for axis in range(3)), np.ones(len(pivots))], axis=1)
          for choice in product((0, 1), repeat=3)],
         axis=1,
     )  # fmt: skip

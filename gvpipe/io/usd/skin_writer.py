@@ -23,13 +23,13 @@ MOVES_FIRST = 1e-3  # of the diagonal: the first frame is the bind pose if no ve
 
 
 def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, ExportMesh]], start: float, name: str) -> None:
-    """Add a skeleton below a SkelRoot, its animation, and how meshes follow it; their points are the bind pose.
+    """Add a skeleton below a SkelRoot, its animation, and how meshes follow it, whose points are the bind pose.
 
     Args:
         stage: of USD.
         root: path of its SkelRoot.
         skin: of the sequence's vertices.
-        meshes: as USD has them, without points.
+        meshes: as USD has them.
         start: time code of the first frame.
         name: of the file, for messages.
 
@@ -51,10 +51,6 @@ def write_skeleton(stage: Any, root: str, skin: Skin, meshes: list[tuple[Any, Ex
     UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets([animation.GetPath()])
     for drawn, mesh in meshes:
         own = slice(*mesh.vertices)
-        points = np.ascontiguousarray(skin.bind[own], np.float32)
-        drawn.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-        bounds = np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), np.float32)
-        drawn.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(bounds))
         binding = UsdSkel.BindingAPI.Apply(drawn.GetPrim())
         binding.CreateSkeletonRel().SetTargets([Sdf.Path(f"{root}/Skeleton")])
         inner = 2 * skin.indices[own].reshape(-1) + 1

@@ -120,16 +120,19 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     drawn = [_define(stage, where, mesh, sequence, materials) for where, mesh in zip(paths, meshes, strict=True)]
     for each, mesh in zip(drawn, meshes, strict=True):
         said.extend(write_primvars(each, mesh, attributes, names))
+    pairs = list(zip(drawn, meshes, strict=True))
     if skin is None:
-        _write_frames(sequence, list(zip(drawn, meshes, strict=True)), normals, start)
+        _write_frames(sequence, pairs, normals, start)
     else:
-        write_skeleton(stage, f"/{root}", skin, list(zip(drawn, meshes, strict=True)), start, name)
+        for one, mesh in pairs:
+            PointsWriter(one, start, is_sampled=False).write(0, np.ascontiguousarray(skin.bind[slice(*mesh.vertices)]))
+        write_skeleton(stage, f"/{root}", skin, pairs, start, name)
         said += [FLAT_TREE] if skin.parents is not None else []
-        said += _write_bind_normals(sequence, list(zip(drawn, meshes, strict=True)), normals, is_first_frame(skin))
+        said += _write_bind_normals(sequence, pairs, normals, is_first_frame(skin))
         if sequence.origin.any():
             UsdGeom.Xformable(top).AddTranslateOp().Set(Gf.Vec3d(*sequence.origin.tolist()))
     for field_name, field in normals.fields.items():
-        write_field(names[field_name], field, list(zip(drawn, meshes, strict=True)), start)
+        write_field(names[field_name], field, pairs, start)
     stage.GetRootLayer().Save()
     parts = [(mesh.name, where.rpartition("/")[2]) for where, mesh in zip(paths, meshes, strict=True)]
     return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes, skin is not None))

@@ -13,7 +13,7 @@ from gvpipe.foundation.arrays import Array, Float64, Int64, UInt8
 from gvpipe.io.gltf.meshopt.reading import ATTRIBUTES_HEADER, LEAST_TAIL, TRIANGLES_HEADER, TRIANGLES_TAIL
 
 OWN_CODES = 14  # pairs that have a code of their own
-BITS = 16  # of quaternions
+QUATERNION_BITS = 16  # at most
 LEAST_EXPONENT, MOST_EXPONENT = -126, 104  # of steps
 MANTISSA = (1 << 23) - 1  # the largest
 
@@ -60,7 +60,7 @@ def pack_floats(values: Array, step: float) -> UInt8:
     return np.ascontiguousarray(packed.astype("<i4")).view(np.uint8)
 
 
-def pack_quaternions(quaternions: Float64, bits: int = BITS) -> UInt8:
+def pack_quaternions(quaternions: Float64, bits: int = QUATERNION_BITS) -> UInt8:
     """Unit quaternions ``(n, 4)`` for filter QUATERNION, as elements ``(n, 8)`` of so many bits, 4 to 16."""
     rows = np.arange(len(quaternions))
     largest: Int64 = np.abs(quaternions).argmax(axis=1)
