@@ -300,6 +300,7 @@ def skin(
     target_kg: float | None = None,
     max_error: float | str | None = None,
     rigid: bool = False,
+    correctives: int = 64,
     progress: Progress | None = None,
 ) -> Skin:
     """Find a skeleton that moves a sequence: joints, weights, and the joints' transforms in every frame.
@@ -310,6 +311,8 @@ def skin(
         target_kg: Karni and Gotsman's error that it should not exceed, percent; 0.14 if neither errors nor joints are given.
         max_error: largest distance of a vertex, as of `encode`.
         rigid: joints turn, go and grow alike along all axes, one below the other, as bones of engines do; else they are affine.
+        correctives: shapes that may be added where joints do not hold the error, at most, 0..1024: morph targets of glTF,
+            blend shapes of USD. Fewer joints with some take their place where that is smaller.
         progress: called with each stage and the part of it that is done.
 
     Returns:
@@ -323,15 +326,16 @@ def skin(
     """
     from gvpipe.skinning.fit import fit_skin
 
-    if isinstance(joints, bool) or not hasattr(joints, "__index__"):
-        raise TypeError(f"gvpipe.skin's joints is {show(joints)}; an integer is needed")
+    for name, number in (("joints", joints), ("correctives", correctives)):
+        if isinstance(number, bool) or not hasattr(number, "__index__"):
+            raise TypeError(f"gvpipe.skin's {name} is {show(number)}; an integer is needed")
     if target_kg is not None:
         check_number(target_kg, "gvpipe.skin's target_kg")
     if not isinstance(source, MeshSequence):
         check_path(source, "gvpipe.skin's source", "a MeshSequence or ")
     sequence = source if isinstance(source, MeshSequence) else read(source)
     bound = None if max_error is None else parse_bound(max_error, sequence)
-    return fit_skin(sequence, int(joints), target_kg, bound, progress, rigid).skin
+    return fit_skin(sequence, int(joints), target_kg, bound, progress, rigid, int(correctives)).skin
 
 
 def render(

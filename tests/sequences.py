@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
+from gvpipe.asset.part import Part
 from gvpipe.model.sequence import MeshSequence
 
 
@@ -36,6 +39,16 @@ def rigid(n: int = 12, n_frames: int = 60) -> MeshSequence:
     second = np.stack([x + 2 + 0 * angle, y * np.cos(angle), y * np.sin(angle)], axis=2)
     positions = np.concatenate([first, second], axis=1).astype(np.float32)
     return MeshSequence(positions, np.concatenate([faces, faces + n * n]).astype(np.int32), 24.0, name="rigid")
+
+
+def wrinkled(n_frames: int = 24) -> MeshSequence:
+    """Two sheets that turn as a whole; waves that no joint knows run over the first."""
+    sequence = rigid(12, n_frames)
+    frames = sequence.read(0, n_frames).copy()
+    x, y = frames[0, :144, 0], frames[0, :144, 1]
+    phase = np.arange(n_frames)[:, None] / 3
+    frames[:, :144, 1] += (0.05 * np.sin(14 * x + phase) * np.sin(17 * y)).astype(np.float32)
+    return replace(sequence, positions=frames, parts=(Part("waves", (0, 144), (0, 242)), Part("stiff", (144, 288), (242, 484))))
 
 
 def partly_still() -> MeshSequence:

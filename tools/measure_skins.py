@@ -27,7 +27,9 @@ from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
 
 TARGET_KG = 0.15
-HEAD = "| sequence | source | MP4 | morph targets | after gltfpack | skeleton (joints) | compressed | KG | fit / encode |"
+HEAD = (
+    "| sequence | source | MP4 | morph targets | after gltfpack | skeleton (joints + shapes) | compressed | KG | fit / encode |"
+)
 
 
 def main() -> None:
@@ -60,7 +62,12 @@ def measure(path: Path, folder: Path, gltfpack: list[str]) -> dict[str, Any]:
     gvpipe.write(sequence, folder / "morph.glb")
     gvpipe.write(sequence, folder / "skin.glb", skin=skin)
     gvpipe.write(sequence, folder / "small.glb", skin=skin, compress="meshopt")
-    row: dict[str, Any] = {"sequence": path.stem, "joints": skin.joints, "kg": kg_of(folder / "small.glb", sequence)}
+    row: dict[str, Any] = {
+        "sequence": path.stem,
+        "joints": skin.joints,
+        "shapes": len(skin.shapes),
+        "kg": kg_of(folder / "small.glb", sequence),
+    }
     row["source"] = 12 * sequence.n_frames * sequence.n_vertices if path.suffix == ".npz" else path.stat().st_size
     row |= {name: (folder / file).stat().st_size for name, file in FILES.items()}
     row["time"] = fitting / encoding
@@ -92,9 +99,10 @@ def shown(row: dict[str, Any]) -> str:
     """A row as Markdown."""
     kg = "-" if row["kg"] is None else f"{row['kg']:.3f}"
     packed = f"{row['gltfpack']:,}" if "gltfpack" in row else "-"
+    shapes = f" + {row['shapes']}" if row["shapes"] else ""
     return (
         f"| {row['sequence']} | {row['source']:,} | {row['mp4']:,} | {row['morph']:,} | {packed} | "
-        f"{row['skin']:,} ({row['joints']}) | {row['compressed']:,} | {kg} | {row['time']:.1f} |"
+        f"{row['skin']:,} ({row['joints']}{shapes}) | {row['compressed']:,} | {kg} | {row['time']:.1f} |"
     )
 
 

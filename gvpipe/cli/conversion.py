@@ -45,6 +45,12 @@ if TYPE_CHECKING:
     metavar="N|rigid|rigid:N",
     help="About how many, of the skeleton; rigid: bones without shear, in a tree. [default: as many as the error takes]",
 )
+@click.option(
+    "--correctives",
+    type=int,
+    metavar="N",
+    help="Most corrective shapes (morph targets) where joints do not hold the error; 0: none. [default: 64]",
+)
 @click.option("--target-kg", type=float, help="Largest KG error of the skeleton, percent. [default: 0.14]")
 @click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
 @compress_option
@@ -64,6 +70,7 @@ def convert(
     split: bool,
     skin: bool,
     joints: str | None,
+    correctives: int | None,
     target_kg: float | None,
     max_error: str | None,
     compress: str,
@@ -93,7 +100,7 @@ def convert(
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
     number, is_rigid = parse_joints(joints)
-    wanted = SkinOptions(number, target_kg, max_error, is_rigid)
+    wanted = SkinOptions(number, target_kg, max_error, is_rigid, correctives)
     check_glb_options(target, skin, compress, wanted)
     if split:
         if clip == ALL or lod or start is not None or stop is not None or target == PIPE:
@@ -133,7 +140,8 @@ def convert(
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces)}
-    values |= {"joints": found.joints if found else 0} if takes_skin(target) else {}
+    if takes_skin(target):
+        values |= {"joints": found.joints if found else 0, "correctives": len(found.shapes) if found else 0}
     values |= {"clips": [each.name for each in clips]} if clips else {}
     out.json({**values, "origin": sequence.origin.tolist(), "notes": noticed})
     shape = shape_of(stop - start, sequence.n_vertices)
@@ -155,10 +163,11 @@ def _convert_split(
     from gvpipe.cli.splitting import write_runs
     from gvpipe.playback import files
 
-    def write(run: Run, path: Path) -> tuple[int, list[str]]:
+    def write(run: Run, path: Path) -> tuple[dict[str, int], list[str]]:
         skin, said = find_skin(run.sequence, wanted, progress) if wanted and run.sequence.n_frames > 1 else (None, [])
         notes = files.write(run.sequence, path, run.start, skin, compress)
-        return skin.joints if skin else 0, [*(f"{path.name}: {each}" for each in said), *notes]
+        counts = {"joints": skin.joints if skin else 0, "correctives": len(skin.shapes) if skin else 0}
+        return counts if wanted else {}, [*(f"{path.name}: {each}" for each in said), *notes]
 
     with source_path(source) as given, out.progress() as progress:
         runs = files.read_runs(given, **options)
@@ -179,8 +188,8 @@ def _convert_split(
             "triangles": len(run.sequence.faces),
             "origin": run.sequence.origin.tolist(),
         }
-        | ({"joints": n_joints} if wanted else {})
-        for (name, (n_joints, _)), run in zip(written, ready, strict=True)
+        | counts
+        for (name, (counts, _)), run in zip(written, ready, strict=True)
     ]
     out.json({"files": listed, "notes": noticed})
     for each in listed:

@@ -30,12 +30,13 @@ Found = tuple["Skin | None", list[str]]  # a skeleton, and what to say of it
 
 
 class SkinOptions(NamedTuple):
-    """What a skeleton should be like: ``--joints``, ``--target-kg`` and ``--max-error``."""
+    """What a skeleton should be like: ``--joints``, ``--target-kg``, ``--max-error`` and ``--correctives``."""
 
     joints: int = 0
     target_kg: float | None = None
     max_error: str | None = None
     is_rigid: bool = False
+    correctives: int | None = None  # None: as many as usual
 
 
 def parse_joints(text: str | None) -> tuple[int, bool]:
@@ -103,7 +104,7 @@ def check_glb_options(target: str, is_wanted: bool, compress: str, wanted: SkinO
     if compress != "none" and not is_glb(target):
         raise click.UsageError(f"--compress is for a .glb; OUTPUT is {target!r}")
     if wanted and wanted != SkinOptions() and not is_wanted:
-        raise click.UsageError("--joints, --target-kg and --max-error are of --skin")
+        raise click.UsageError("--joints, --target-kg, --max-error and --correctives are of --skin")
     if is_wanted and not takes_skin(target):
         raise click.UsageError(f"--skin writes a .glb or USD file; OUTPUT is {target!r}")
 
@@ -111,16 +112,17 @@ def check_glb_options(target: str, is_wanted: bool, compress: str, wanted: SkinO
 def find_skin(sequence: MeshSequence, wanted: SkinOptions, progress: Progress | None) -> Found:
     """A skeleton for a sequence, and what to say of it; raises as `fit_skin` does."""
     from gvpipe.rate_control.targets import parse_bound
-    from gvpipe.skinning.fit import fit_skin
+    from gvpipe.skinning.fit import SHAPES, fit_skin
 
     bound = None if wanted.max_error is None else parse_bound(wanted.max_error, sequence)
-    skin, errors, is_met = fit_skin(sequence, wanted.joints, wanted.target_kg, bound, progress, wanted.is_rigid)
+    most = SHAPES if wanted.correctives is None else wanted.correctives
+    skin, errors, is_met = fit_skin(sequence, wanted.joints, wanted.target_kg, bound, progress, wanted.is_rigid, most)
     kg = "" if errors.kg is None else f"KG {errors.kg:.3g} %, "
     off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else f"{errors.max:.2g} units"
     kind = "rigid " if wanted.is_rigid else ""
-    said = [f"a {kind}skeleton of {_joints(skin)} moves it: {kg}vertices are up to {off} off"]
+    said = [f"a {kind}skeleton of {_joints(skin)}{_shapes(skin)} moves it: {kg}vertices are up to {off} off"]
     if not is_met:
-        said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints")
+        said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints or --correctives")
     return skin, said
 
 
@@ -159,3 +161,8 @@ def smaller_without(path: str, sequence: MeshSequence, compress: str) -> list[st
 
 def _joints(skin: Skin) -> str:
     return "one joint" if skin.joints == 1 else f"{skin.joints} joints"
+
+
+def _shapes(skin: Skin) -> str:
+    count = len(skin.shapes)
+    return f" and {'one corrective shape' if count == 1 else f'{count} corrective shapes'}" if count else ""

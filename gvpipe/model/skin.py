@@ -1,14 +1,19 @@
-"""A skeleton that moves a mesh: linear blend skinning of a bind pose by affine joints."""
+"""A skeleton that moves a mesh: linear blend skinning of a bind pose, which corrective shapes may change, by affine joints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError
 from gvpipe.model.clips import Clip
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 ROUNDING = 1e-5  # of the sum of weights
 INFLUENCES = 4  # joints that a vertex follows, at most
@@ -19,7 +24,8 @@ class Skin:
     """Joints, and how a mesh of V vertices follows them in F frames.
 
     Vertex v of frame k is at ``sum over i  weights[v, i] (A bind[v] + t)``, with ``A = transforms[k, j, :3, :3]`` and
-    ``t = transforms[k, j, :3, 3]`` of joint ``j = indices[v, i]``.
+    ``t = transforms[k, j, :3, 3]`` of joint ``j = indices[v, i]``. With corrective shapes, ``bind`` stands for
+    ``bind + sum over c  shape_weights[k, c] shapes[c]``, as morph targets of glTF and blend shapes of USD are defined.
 
     Args:
         indices: ``(V, 4) int32`` joints, 0..J-1; 0 where a weight is 0.
@@ -32,6 +38,9 @@ class Skin:
         parents: ``(J,) int32`` of joints that turn, go and grow alike along all axes: the one above each, -1 for none; None:
             joints are affine, and none is above another one.
         pivots: ``(J, 3) float64``, where each joint lies in the bind pose; None: in the middle of what follows it.
+        shapes: ``(C, V, 3) float32`` model units, of C corrective shapes; a shape is 0 where it changes nothing.
+        shape_weights: ``(F, C) float64``.
+        rmse: root mean square of the distances whose largest is ``error``, mean over frames, in the same unit; or NaN.
 
     Raises:
         InputError: arrays do not fit each other.
@@ -45,6 +54,9 @@ class Skin:
     clips: tuple[Clip, ...] = ()
     parents: Int32 | None = None
     pivots: Float64 | None = None
+    shapes: Float32 = field(default_factory=lambda: np.zeros((0, 0, 3), np.float32))
+    shape_weights: Float64 = field(default_factory=lambda: np.zeros((0, 0)))
+    rmse: float = float("nan")
 
     def __post_init__(self) -> None:
         for name, dtype in (("indices", np.int32), ("weights", np.float32), ("bind", np.float32), ("transforms", np.float64)):
@@ -58,12 +70,27 @@ class Skin:
         if not (np.isfinite(self.transforms).all() and np.isfinite(self.bind).all()):
             raise InputError("a skin's bind pose or transforms are not finite")
         self._check_tree(n_joints)
+        self._check_shapes()
         for clip in self.clips:
             if not 0 <= clip.start < clip.stop <= self.n_frames:
                 raise InputError(f"clip {clip.name!r} is of frames {clip.start}..{clip.stop}; the skin has {self.n_frames}")
         off = np.abs(self.weights.sum(axis=1, dtype=np.float64) - 1).max(initial=0)
         if not (self.weights.min(initial=0) >= 0 and off <= ROUNDING):
             raise InputError("a skin's weights are below 0, or do not add up to 1 at each vertex; divide them by their sum")
+
+    def _check_shapes(self) -> None:
+        shapes, weights = np.asarray(self.shapes, np.float32), np.asarray(self.shape_weights, np.float64)
+        if not len(shapes) and not weights.size:
+            shapes, weights = np.zeros((0, len(self.bind), 3), np.float32), np.zeros((self.n_frames, 0))
+        if shapes.shape != (len(shapes), len(self.bind), 3) or weights.shape != (self.n_frames, len(shapes)):
+            raise InputError(
+                f"a skin's shapes are {shapes.shape}, their weights {weights.shape}; (C, {len(self.bind)}, 3) and "
+                f"({self.n_frames}, C) are needed"
+            )
+        if not (np.isfinite(shapes).all() and np.isfinite(weights).all()):
+            raise InputError("a skin's shapes or their weights are not finite")
+        object.__setattr__(self, "shapes", shapes)
+        object.__setattr__(self, "shape_weights", weights)
 
     def _check_tree(self, n_joints: int) -> None:
         if self.pivots is not None:
@@ -93,26 +120,41 @@ class Skin:
 
     def evaluate(self, frame: int) -> Float32:
         """Positions of a frame: ``(V, 3) float32``, model units."""
-        return self.posed(self.transforms[frame])
+        if not len(self.shapes):
+            return self.posed(self.transforms[frame])
+        added = np.tensordot(self.shape_weights[frame], self.shapes, 1)
+        return self.posed(self.transforms[frame], self.bind + added)
 
     def read(self, start: int, stop: int) -> Float32:
         """Positions of frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units."""
         frames = [self.evaluate(k) for k in range(start, stop)]
         return np.stack(frames) if frames else np.zeros((0, *self.bind.shape), np.float32)
 
-    def posed(self, transforms: Float64) -> Float32:
-        """Positions ``(V, 3) float32`` by the joints' transforms ``(J, 4, 4)``."""
-        points = np.concatenate([self.bind, np.ones((len(self.bind), 1))], axis=1)
-        result = np.zeros((len(points), 3))
-        for i in range(INFLUENCES):
-            used = np.flatnonzero(self.weights[:, i])
-            own = transforms[self.indices[used, i], :3]
-            result[used] += self.weights[used, i, None] * np.einsum("vij,vj->vi", own, points[used])
-        return result.astype(np.float32)
+    def posed(self, transforms: Float64, bind: Float32 | Float64 | None = None) -> Float32:
+        """Positions ``(V, 3) float32`` by the joints' transforms ``(J, 4, 4)``, of another ``bind (V, 3)`` if given."""
+        blended = self._blended(transforms)
+        points = (self.bind if bind is None else bind).astype(np.float64)
+        return np.asarray(np.einsum("vij,vj->vi", blended[:, :, :3], points) + blended[:, :, 3]).astype(np.float32)
+
+    def blended(self, frame: int) -> Float64:
+        """``(V, 3, 4)``: how the joints together turn, stretch and move what lies about each vertex in a frame."""
+        return self._blended(self.transforms[frame])
+
+    def _blended(self, transforms: Float64) -> Float64:
+        return np.asarray((self._blend @ transforms[:, :3].reshape(len(transforms), 12)).reshape(-1, 3, 4))
+
+    @cached_property
+    def _blend(self) -> sparse.csr_array:
+        """``(V, J)``: the weight of each joint."""
+        from scipy import sparse
+
+        rows = np.repeat(np.arange(len(self.bind)), INFLUENCES)
+        shape = len(self.bind), self.joints
+        return sparse.csr_array((self.weights.ravel().astype(np.float64), (rows, self.indices.ravel())), shape=shape)
 
     def part(self, start: int, stop: int) -> Skin:
         """Frames ``start`` to ``stop`` alone, as one animation."""
-        return replace(self, transforms=self.transforms[start:stop], clips=())
+        return replace(self, transforms=self.transforms[start:stop], shape_weights=self.shape_weights[start:stop], clips=())
 
 
 def joint_means(skin: Skin, bind: Float32) -> Float64:

@@ -3,7 +3,7 @@
 1. The codec `mcgv` finds clusters and weights for a target error (Le and Deng, "Smooth Skinning Decomposition with Rigid
    Bones", 2012, with affine motions in place of rigid ones).
 2. The bind pose is the first frame. With weights and bind pose given, each frame's transforms follow from least squares.
-3. If the error is too large, more joints are tried.
+3. If the error is too large, corrective shapes are added, or more joints are tried: what takes fewer bytes.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from gvpipe.foundation.progress import Progress, silent
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal, measure_errors
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import INFLUENCES, Skin, joint_means
+from gvpipe.skinning.corrective_fit import correct
 from gvpipe.skinning.rigid_fit import make_rigid
 
 if TYPE_CHECKING:
@@ -35,6 +36,10 @@ MORE = (64, 128, 256)  # joints that are tried where those that the codec finds 
 MOST = 1024  # joints
 DEFAULT_KG = 0.14  # percent: that of quality 75
 SMALLEST = 1e-4  # of the diagonal: joints that are smaller count as so large
+SHAPES = 64  # corrective ones, at most, where no number is given
+JOINT_BYTES, SHAPE_BYTES = 20.0, 3.5  # of a joint and frame, and of a shape and vertex, in compressed files of samba and cloth
+FEWER = 2  # times, joints that are tried with shapes in their place
+LEAST = 8  # joints that shapes are left to help
 RIDGE = 1e-8  # of a joint's energy, towards its motion alone: what no vertex tells follows that
 
 
@@ -71,6 +76,21 @@ class Fitted(NamedTuple):
     errors: Errors
     is_met: bool
 
+    @property
+    def joints_size(self) -> float:
+        """Bytes that its joints take, about, in a compressed file."""
+        return JOINT_BYTES * self.skin.joints * self.skin.n_frames
+
+    @property
+    def shapes_size(self) -> float:
+        """Bytes that its corrective shapes take, about, in a compressed file."""
+        return SHAPE_BYTES * len(self.skin.shapes) * len(self.skin.bind)
+
+    @property
+    def size(self) -> float:
+        """Bytes of both."""
+        return self.joints_size + self.shapes_size
+
 
 def fit_skin(
     sequence: MeshSequence,
@@ -79,8 +99,9 @@ def fit_skin(
     largest: float | None = None,
     progress: Progress | None = None,
     rigid: bool = False,
+    correctives: int = SHAPES,
 ) -> Fitted:
-    """The skeleton with the fewest joints that holds an error, or the best of those that were tried.
+    """The smallest skeleton of those that were tried that holds an error, or the one with the least.
 
     Args:
         sequence: to be moved.
@@ -89,47 +110,124 @@ def fit_skin(
         kg, largest: as of `Wanted`; where neither is given, nor a number of joints, a KG error of `DEFAULT_KG`.
         progress: called with each stage and the part of it that is done.
         rigid: joints turn, go and grow alike along all axes, and are tied to a tree (`gvpipe.skinning.rigid_fit`).
+        correctives: shapes that may be added where joints do not hold the error, at most; 0..1024.
 
     Raises:
         InputError: there is one frame, or a frame cannot be read.
-        SettingError: a number of joints or an error out of range.
+        SettingError: a number of joints or shapes, or an error, out of range.
     """
     if not 0 <= joints <= MOST:
         raise SettingError(f"joints is {joints!r}; an integer in 1..{MOST} is needed, or 0 for as many as it takes")
+    if not 0 <= correctives <= MOST:
+        raise SettingError(f"correctives is {correctives!r}; an integer in 0..{MOST} is needed")
     if sequence.n_frames < 2:
         raise InputError(f"{sequence.name}: {ONE_FRAME}")
     wanted = Wanted(DEFAULT_KG if kg is None and largest is None and not joints else kg, largest)
-    best: Fitted | None = None
-    for skin in _candidates(sequence, joints, wanted, progress or silent, rigid):
-        own, errors = measured(skin, sequence)
-        found = Fitted(own, errors, wanted.is_met(errors))
-        if found.is_met:
-            return found
-        if best is None or errors.rmse < best.errors.rmse:
-            best = found
-    if best is None:
-        raise InputError(f"{sequence.name}: no skeleton was found; its frames have fewer than two vertices")
-    return best
-
-
-def _candidates(sequence: MeshSequence, joints: int, wanted: Wanted, report: Progress, rigid: bool) -> Iterator[Skin]:
-    kg, last = wanted.kg if wanted.kg is not None else DEFAULT_KG, 0
+    search = _Search(sequence, wanted, rigid, correctives, progress or silent)
     begun = ((0, 1.0),) if rigid else ((0, LOOSE), (0, 1.0))
-    tries = ((joints, 1.0),) if joints else (*begun, *((count, 1.0) for count in MORE))
-    for count, factor in tries:
-        if 0 < count <= last:
-            continue
+    for count, factor in ((joints, 1.0),) if joints else (*begun, *((count, 1.0) for count in MORE)):
+        if search.look(count, factor):
+            break
+    if not (joints or rigid):
+        search.look_for_fewer()
+    found = search.held or search.best
+    if found is None:
+        raise InputError(f"{sequence.name}: no skeleton was found; its frames have fewer than two vertices")
+    return found
+
+
+@dataclass(eq=False)
+class _Search:
+    """Skeletons that were tried.
+
+    Args:
+        sequence, wanted, rigid, correctives, report: as `fit_skin` has them.
+
+    Attributes:
+        held: the smallest one that holds the error.
+        best: of those whose joints alone do not hold it, the one with the least error.
+        joints: that the codec found last.
+    """
+
+    sequence: MeshSequence
+    wanted: Wanted
+    rigid: bool
+    correctives: int
+    report: Progress
+    held: Fitted | None = None
+    best: Fitted | None = None
+    joints: int = 0
+
+    def look(self, count: int, factor: float) -> bool:
+        """Try a number of joints, 0 for any, and part of the error; returns whether more joints would be of no use."""
+        if 0 < count <= self.joints:
+            return False
+        kg = self.wanted.kg if self.wanted.kg is not None else DEFAULT_KG
         codec = make_codec(CODEC, {"quality": quality_of(factor * kg), "clusters": count})
-        encoded = encode_sequence(codec, sequence, report)
-        coarse = read_skin(encoded.bitstream)
+        coarse = read_skin(encode_sequence(codec, self.sequence, self.report).bitstream)
         if coarse is None:
+            return True
+        self.joints = coarse.joints
+        nearest: Fitted | None = None
+        for skin in self._candidates(coarse):
+            found = Fitted(*measured(skin, self.sequence), False)
+            if self.wanted.is_met(found.errors):
+                self._hold(found._replace(is_met=True))
+                return True
+            if nearest is None or found.errors.rmse < nearest.errors.rmse:
+                nearest = found
+        assert nearest is not None  # there is a candidate
+        if self.best is None or nearest.errors.rmse < self.best.errors.rmse:
+            self.best = nearest
+        corrected = self._corrected(nearest)
+        if corrected:
+            self._hold(corrected)
+        return corrected is not None and corrected.shapes_size <= corrected.joints_size / 2
+
+    def look_for_fewer(self) -> None:
+        """Try fewer joints, with shapes in their place, for as long as that pays."""
+        while self.correctives and self.held:
+            before = self.held
+            fewer = before.skin.joints // FEWER
+            spared = JOINT_BYTES * (before.skin.joints - fewer) * self.sequence.n_frames
+            is_even = before.shapes_size > before.joints_size / 2
+            if is_even or fewer < LEAST or spared <= 2 * SHAPE_BYTES * self.sequence.n_vertices:
+                return
+            self.joints = 0
+            self.look(fewer, 1.0)
+            if self.held is before:
+                return
+
+    def _candidates(self, coarse: Skin) -> Iterator[Skin]:
+        if self.rigid:
+            yield make_rigid(coarse, self.sequence, self.report)
             return
-        last = coarse.joints
-        if rigid:
-            yield make_rigid(coarse, sequence, report)
-            continue
-        yield refit(coarse, sequence, report)
+        yield refit(coarse, self.sequence, self.report)
         yield coarse  # better where the codec's bind pose is smoother than the first frame
+
+    def _hold(self, found: Fitted) -> None:
+        if self.held is None or found.size < self.held.size:
+            self.held = found
+
+    def _corrected(self, found: Fitted) -> Fitted | None:
+        """A skeleton with the fewest corrective shapes that hold the error; None if the most that are allowed do not.
+
+        What takes more than the skeleton that holds it already is not looked at.
+        """
+        room = math.inf if self.held is None else (self.held.size - found.joints_size) / (SHAPE_BYTES * len(found.skin.bind))
+        most = int(min(self.correctives, room))
+        if most < 1:
+            return None
+        results: dict[int, Fitted] = {}
+
+        def is_enough(skin: Skin) -> bool:
+            own, errors = measured(skin, self.sequence)
+            results[len(skin.shapes)] = Fitted(own, errors, self.wanted.is_met(errors))
+            return results[len(skin.shapes)].is_met
+
+        part = (self.wanted.kg or math.inf) / (found.errors.kg or math.inf)
+        corrected = correct(found.skin, self.sequence, most, 1.0 if math.isnan(part) else part, is_enough)
+        return None if corrected is None else results[len(corrected.shapes)]
 
 
 def refit(skin: Skin, sequence: MeshSequence, report: Progress = silent) -> Skin:
@@ -196,6 +294,7 @@ def _blend(skin: Skin, bind: Float32, frames: Float64) -> tuple[sparse.csr_array
 
 
 def measured(skin: Skin, sequence: MeshSequence) -> tuple[Skin, Errors]:
-    """The skin with its largest error about the frames of a sequence, and all errors."""
+    """The skin with its errors about the frames of a sequence, and all errors."""
     errors = measure_errors(sequence, skin.read)
-    return replace(skin, error=math.nan if errors.max_diag is None else errors.max_diag), errors
+    largest, rmse = (math.nan if each is None else each for each in (errors.max_diag, errors.rmse_diag))
+    return replace(skin, error=largest, rmse=rmse), errors

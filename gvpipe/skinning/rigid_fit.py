@@ -1,6 +1,7 @@
 """Skeletons of rigid joints: each turns, goes and grows alike along all axes, for engines whose bones know no shear.
 
-Joints and weights of an affine skeleton are the start. Then two steps take turns, on some of the frames:
+Joints and weights of an affine skeleton are one start, clusters that move rigidly (`gvpipe.skinning.rigid_clusters`) the other.
+From each, and further from the better one, two steps take turns, on some of the frames:
 
 1. Joint after joint, the motion that mends most of what the others leave (Horn, 1987; Le and Deng, "Smooth Skinning
    Decomposition with Rigid Bones", 2012, section 4.3, with a scale).
@@ -24,12 +25,14 @@ from gvpipe.mesh.topology import adjacency
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import INFLUENCES, Skin, joint_means
+from gvpipe.skinning.rigid_clusters import split_clusters
 
 if TYPE_CHECKING:
     from scipy import sparse
 
 FRAMES = 32  # that weights are fitted on
-ROUNDS = 5  # of both steps
+CLUSTER_FRAMES = 12  # of these, that clusters are found in
+TRIED, ROUNDS = 5, 10  # rounds of both steps: from each start, and from the better of them
 SWEEPS = 3  # over all joints, in each
 CANDIDATES = 8  # joints that a vertex may follow, of which four stay
 BLOCK = 1024  # vertices whose weights are fitted together
@@ -82,14 +85,13 @@ def make_rigid(skin: Skin, sequence: MeshSequence, report: Progress = silent) ->
     chosen = np.unique(np.linspace(0, sequence.n_frames - 1, FRAMES).astype(int)).tolist()
     some = np.stack([(sequence.read(k, k + 1)[0] - centre) / diagonal for k in chosen])
     around = adjacency(sequence.faces, len(bind))
-    indices, weights = skin.indices, skin.weights.astype(np.float64)
+    starts = ((skin.indices, skin.weights.astype(np.float64)), _clusters(bind, some, skin.joints))
+    found = [_alternate(bind, some, around, *start, skin.joints, TRIED) for start in starts]
+    report("rigid skin", 2 * TRIED / (2 * TRIED + ROUNDS + 1))
+    _, indices, weights = min(found, key=lambda one: one[0])
+    _, indices, weights = _alternate(bind, some, around, indices, weights, skin.joints, ROUNDS)
     members = Members.of(indices, weights, skin.joints)
-    motions = _begin(bind, some, members)
-    for number in range(ROUNDS):
-        _mend(motions, bind, some, members, SWEEPS)
-        indices, weights = _fit_weights(motions, bind, some, around, indices, weights)
-        members = Members.of(indices, weights, skin.joints)
-        report("rigid skin", (number + 1) / (ROUNDS + 1))
+    report("rigid skin", (2 * TRIED + ROUNDS) / (2 * TRIED + ROUNDS + 1))
     transforms = np.tile(np.eye(4), (sequence.n_frames, skin.joints, 1, 1))
     for start, block in sequence.chunks():
         frames = (block - centre) / diagonal
@@ -102,8 +104,37 @@ def make_rigid(skin: Skin, sequence: MeshSequence, report: Progress = silent) ->
     used, numbers = np.unique(np.where(weights > 0, indices, indices[:, :1]), return_inverse=True)
     renumbered: Int32 = np.where(weights > 0, numbers.reshape(indices.shape), 0).astype(np.int32)
     made = Skin(renumbered, weights.astype(np.float32), first, transforms[:, used])
-    parents, pivots = _tie(made)
+    parents, pivots = _tie(made, around)
     return replace(made, parents=parents, pivots=pivots)
+
+
+def _clusters(bind: Float64, frames: Float64, count: int) -> tuple[Int32, Float64]:
+    """Joints and weights ``(V, 4)`` of vertices that follow one each."""
+    some = frames[np.unique(np.linspace(0, len(frames) - 1, CLUSTER_FRAMES).astype(int))]
+
+    def as_influences(labels: Int64) -> tuple[Int32, Float64]:
+        indices, weights = np.zeros((len(bind), INFLUENCES), np.int32), np.zeros((len(bind), INFLUENCES))
+        indices[:, 0], weights[:, 0] = labels, 1
+        return indices, weights
+
+    def squared_distances(labels: Int64, n: int) -> Float64:
+        motions = _begin(bind, some, Members.of(*as_influences(labels), n))
+        return np.stack([np.square(some - _moved(motion, bind)).sum(axis=(0, 2)) for motion in motions])
+
+    return as_influences(split_clusters(bind, count, squared_distances))
+
+
+def _alternate(
+    bind: Float64, frames: Float64, around: sparse.csr_array, indices: Int32, weights: Float64, n_joints: int, rounds: int
+) -> tuple[float, Int32, Float64]:
+    """Both steps in turn, for some rounds; returns what is left at the last motions, and joints and weights ``(V, 4)``."""
+    members, left = Members.of(indices, weights, n_joints), 0.0
+    motions = _begin(bind, frames, members)
+    for _ in range(rounds):
+        left = _mend(motions, bind, frames, members, SWEEPS)
+        indices, weights = _fit_weights(motions, bind, frames, around, indices, weights)
+        members = Members.of(indices, weights, n_joints)
+    return left, indices, weights
 
 
 def _begin(bind: Float64, frames: Float64, members: Members) -> Float64:
@@ -116,8 +147,8 @@ def _begin(bind: Float64, frames: Float64, members: Members) -> Float64:
     return result
 
 
-def _mend(motions: Float64, bind: Float64, frames: Float64, members: Members, sweeps: int) -> None:
-    """Step 1: change ``motions (J, F, 3, 4)`` in place."""
+def _mend(motions: Float64, bind: Float64, frames: Float64, members: Members, sweeps: int) -> float:
+    """Step 1: change ``motions (J, F, 3, 4)`` in place, and return the sum of squares that they leave."""
     left = frames.copy()  # what all joints leave
     for j, motion in enumerate(motions):
         vertices, weights = members.at(j)
@@ -130,6 +161,7 @@ def _mend(motions: Float64, bind: Float64, frames: Float64, members: Members, sw
             others = left[:, vertices] + weights[:, None] * _moved(motion, bind[vertices])  # what the other joints leave
             motions[j] = similar(bind[vertices], weights * weights, others / weights[:, None])
             left[:, vertices] = others - weights[:, None] * _moved(motions[j], bind[vertices])
+    return float(np.square(left).sum())
 
 
 def _moved(motion: Float64, points: Float64) -> Float64:
@@ -220,15 +252,17 @@ def _solve(gram: Float64, given: Float64, is_in: Bool) -> Float64:
     return np.asarray(np.linalg.solve(system, right[:, :, None])[:, :count, 0])
 
 
-def _tie(skin: Skin) -> tuple[Int32, Float64]:
+def _tie(skin: Skin, around: sparse.csr_array) -> tuple[Int32, Float64]:
     """The parent ``(J,)`` of each joint, -1 for roots, and the points ``(J, 3)`` that they turn about.
 
-    Joints that share most are tied: a spanning tree. Its roots are those that vertices follow most.
+    Joints that share most vertices, or whose vertices are neighbours, are tied: a spanning tree. Its roots are those that
+    vertices follow most.
     """
     from scipy import sparse
     from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
-    followed = _followed(skin.indices, skin.weights, skin.joints)
+    own = _followed(skin.indices, skin.weights, skin.joints)
+    followed = (around @ own + OWN * own).tocsr()
     shared = (followed.T @ followed).toarray()
     sums = shared.sum(axis=1)
     np.fill_diagonal(shared, 0)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from asset_scene import scene
 from folders import DATA, GOLDEN
+from sequences import wrinkled
 
 import gvpipe
 
@@ -58,6 +59,17 @@ def test_blender_moves_skeletons(tmp_path: Path, suffix: str) -> None:
     assert found.shape == expected.shape
     bound = 1e-5 if suffix == "glb" else 1e-4  # USD has scales as half floats
     assert np.linalg.norm(found - expected, axis=2).max() < bound * np.linalg.norm(np.ptp(expected[0], axis=0))
+
+
+@pytest.mark.parametrize("suffix", ["glb", "usdc"])
+@pytest.mark.parametrize("is_rigid", [False, True])
+def test_blender_moves_corrective_shapes(tmp_path: Path, suffix: str, is_rigid: bool) -> None:
+    sequence = wrinkled()
+    skin = gvpipe.skin(sequence, joints=2, target_kg=0.2, rigid=is_rigid)
+    gvpipe.write(sequence, tmp_path / f"a.{suffix}", skin=skin)
+    found = by_blender(tmp_path / f"a.{suffix}", sequence.fps)["positions"]
+    for ours, theirs in zip(skin.read(0, N_FRAMES), found, strict=True):
+        assert len(skin.shapes) and farthest(ours[:, [0, 2, 1]] * [1, -1, 1], theirs) < max(1e-4, 0.1 * skin.error)
 
 
 def by_blender(path: Path, fps: float) -> Any:

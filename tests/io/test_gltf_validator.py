@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from asset_scene import scene
 from folders import DATA, GOLDEN, ROOT
+from sequences import wrinkled
 
 import gvpipe
 
@@ -79,6 +80,8 @@ def test_no_error_of_skeletons(tmp_path: Path) -> None:
     gvpipe.write(source, tmp_path / "scene.glb", skin=gvpipe.skin(source))
     with gvpipe.open(GOLDEN / "mcgv-1-rigid.mp4") as video:
         gvpipe.write(video.sequence(), tmp_path / "video.glb", skin=video.skin())
-    found = reports(tmp_path / "scene.glb", tmp_path / "video.glb")
-    assert [faults(report) for report in found] == [[], []]
-    assert all(report["info"]["hasSkins"] for report in found)
+    waves = wrinkled()
+    gvpipe.write(waves, tmp_path / "shapes.glb", skin=gvpipe.skin(waves, joints=2, target_kg=0.2))
+    found = reports(tmp_path / "scene.glb", tmp_path / "video.glb", tmp_path / "shapes.glb")
+    assert [faults(report) for report in found] == [[], [], []]
+    assert found[2]["info"]["hasMorphTargets"] and all(report["info"]["hasSkins"] for report in found)

@@ -15,7 +15,7 @@ import trimesh
 from asset_scene import scene
 from folders import GOLDEN, ROOT
 from scipy.spatial.transform import Rotation
-from sequences import rigid, waving
+from sequences import rigid, waving, wrinkled
 
 import gvpipe
 from gvpipe.foundation.errors import InputError, SettingError
@@ -274,6 +274,70 @@ def test_a_skeleton_is_found_for_a_sequence(tmp_path: Path) -> None:
     assert farthest(gvpipe.read(tmp_path / "a.glb").read(0, len(frames)), frames) < 1e-3
 
 
+def test_corrective_shapes_add_what_joints_leave(tmp_path: Path, run: Any) -> None:
+    """Few joints hold the error with shapes; every reader and engine shows what the skin says."""
+    sequence = wrinkled()
+    alone = gvpipe.skin(sequence, joints=2, target_kg=0.2, correctives=0)
+    skin = gvpipe.skin(sequence, joints=2, target_kg=0.2)
+    assert not len(alone.shapes) and alone.error > 0.01 and 1 <= len(skin.shapes) <= 8 and skin.joints == alone.joints
+    frames = sequence.read(0, sequence.n_frames)
+    assert (gvpipe.compare(sequence, replace(sequence, positions=skin.read(0, len(frames)))).kg or 1) <= 0.2
+    assert skin.error == pytest.approx(farthest(skin.read(0, len(frames)), frames))
+    assert not skin.shapes[:, 144:].any()  # the stiff sheet has none
+    assert (skin.shape_weights.min(axis=0) == 0).all() and (skin.shape_weights.max(axis=0) == 1).all()
+    assert np.array_equal(skin.part(3, 9).evaluate(2), skin.evaluate(5))
+    limit = max(2e-5, 0.1 * skin.error)
+    for compress in ("none", "meshopt"):
+        path = tmp_path / f"{compress}.glb"
+        gvpipe.write(sequence, path, skin=skin, compress=compress)
+        sources = prepare(sequence, is_packed=compress == "meshopt").split.sources
+        assert farthest(gvpipe.read(path).read(0, len(frames)), skin.read(0, len(frames))[:, sources]) < limit
+        meshes = _tree(path)["meshes"]
+        assert [("targets" in each["primitives"][0]) for each in meshes] == [True, False]
+    ended = run(
+        "convert", _saved(sequence, tmp_path), tmp_path / "c.glb", "--skin", "--joints", "2", "--target-kg", "0.2", "--json"
+    )
+    assert json.loads(ended.out)["correctives"] == len(skin.shapes) and "corrective shape" in ended.err
+    ended = run(
+        "convert",
+        _saved(sequence, tmp_path),
+        tmp_path / "d.glb",
+        "--skin",
+        "--target-kg",
+        "0.2",
+        "--correctives",
+        "0",
+        "--json",
+    )
+    assert json.loads(ended.out)["correctives"] == 0
+    assert run("convert", _saved(sequence, tmp_path), tmp_path / "e.glb", "--correctives", "3").status == 2
+
+
+def _saved(sequence: MeshSequence, folder: Path) -> Path:
+    gvpipe.write(sequence, folder / "in.npz")
+    return folder / "in.npz"
+
+
+@each_engine
+@pytest.mark.parametrize("compress", ["none", "meshopt"])
+def test_engines_show_corrective_shapes(compress: str, engine: str, tmp_path: Path) -> None:
+    sequence = wrinkled()
+    skin = gvpipe.skin(sequence, joints=2, target_kg=0.2)
+    gvpipe.write(sequence, tmp_path / "a.glb", skin=skin, compress=compress)
+    sources = prepare(sequence, is_packed=compress == "meshopt").split.sources
+    shown = [0, 1, 11, 23]
+    found = shown_by(engine, tmp_path / "a.glb", [k / sequence.fps for k in shown])
+    assert farthest(found, skin.read(0, 24)[shown][:, sources]) < max(2e-5, 0.1 * skin.error)
+
+
+def test_shapes_where_the_largest_error_counts() -> None:
+    sequence = wrinkled()
+    skin = gvpipe.skin(sequence, joints=2, max_error="0.5%")
+    assert len(skin.shapes) and skin.error <= 0.005
+    rigid_joints = gvpipe.skin(sequence, joints=2, max_error="0.5%", rigid=True)
+    assert len(rigid_joints.shapes) and rigid_joints.error <= 0.005
+
+
 def bent_arm() -> MeshSequence:
     """A tube of three bones, each of which turns against the one before it."""
     tube = waving(12, 1)
@@ -440,6 +504,26 @@ def test_usd_has_the_skeleton(suffix: str, tmp_path: Path) -> None:
     assert farthest(found.read(0, found.n_frames) + found.origin, absolute) < 3e-4
 
 
+def test_usd_has_a_tree_of_rigid_joints_and_corrective_shapes(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdSkel
+
+    for name, sequence, target in (("a", bent_arm(), None), ("b", wrinkled(), 0.2)):
+        skin = gvpipe.skin(sequence, 3 if target is None else 2, target_kg=target, rigid=True)
+        path = tmp_path / f"{name}.usdc"
+        assert len(gvpipe.write(sequence, path, skin=skin)) == 1  # of the unit of length
+        stage = Usd.Stage.Open(str(path))  # kept while its prims are looked at
+        prims = list(stage.Traverse())
+        (skeleton,) = (UsdSkel.Skeleton(prim) for prim in prims if prim.IsA(UsdSkel.Skeleton))
+        names = list(skeleton.GetJointsAttr().Get())
+        assert skin.parents is not None
+        assert len(names) == skin.joints and sum("/" in each for each in names) == np.count_nonzero(skin.parents >= 0)
+        shown = [prim for prim in prims if prim.IsA(UsdSkel.BlendShape)]  # those that change a part, for each part
+        assert len(shown) == sum(skin.shapes[:, slice(*part.vertices)].any(axis=(1, 2)).sum() for part in sequence.parts)
+        found = gvpipe.read(path).read(0, sequence.n_frames)
+        assert farthest(found, skin.read(0, sequence.n_frames)) < 3e-4
+
+
 def test_usd_of_a_video_turns_no_wrong_normals(tmp_path: Path, run: Any) -> None:
     """A file's bind pose is no frame, so its normals are left out, and a note says so."""
     pytest.importorskip("pxr")
@@ -477,6 +561,13 @@ def test_what_is_refused(tmp_path: Path) -> None:
         replace(skin, pivots=np.zeros((1, 2)))
     with pytest.raises(InputError, match="clip 'a' is of frames"):
         replace(skin, clips=(Clip("a", 0, 99),))
+    for shapes, weights in (((2, 3, 3), (5, 2)), ((2, 16, 3), (4, 2))):
+        with pytest.raises(InputError, match="a skin's shapes are"):
+            replace(skin, shapes=np.zeros(shapes, np.float32), shape_weights=np.zeros(weights))
+    with pytest.raises(InputError, match="shapes or their weights are not finite"):
+        replace(skin, shapes=np.full((1, 16, 3), np.nan, np.float32), shape_weights=np.ones((5, 1)))
+    with pytest.raises(SettingError, match="correctives is"):
+        gvpipe.skin(sequence, correctives=-1)
     for joints in (-1, 1025):
         with pytest.raises(SettingError, match="joints is"):
             gvpipe.skin(sequence, joints=joints)
@@ -544,6 +635,9 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert gvpipe.read(tmp_path / "h.glb").n_frames == 6
     ended = run("convert", tmp_path / "in.npz", tmp_path / "r.glb", "--skin", "--joints", "rigid:4", "--json")
     assert ended.status == 0 and "a rigid skeleton of" in ended.err and json.loads(ended.out)["joints"] >= 2
+    gvpipe.encode(rigid(), tmp_path / "levels.mp4", "pca")
+    ended = run("convert", tmp_path / "levels.mp4", tmp_path / "lod.glb", "--lod", "1", "--skin", "--json")
+    assert json.loads(ended.out)["vertices"] == gvpipe.read(tmp_path / "lod.glb").n_vertices < 288
     ended = run("convert", tmp_path / "in.npz", tmp_path / "s.glb", "--skin", "--joints", "stiff")
     assert ended.status == 2 and "--joints is 'stiff'" in ended.err
     frames = tmp_path / "frames"

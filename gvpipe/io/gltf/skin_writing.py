@@ -4,6 +4,8 @@ A joint's motion is affine: two nodes (`gvpipe.io.scene.affine_nodes`), so that 
 matrices down the tree. Or it is rigid, and one node below its parent's. Inverse bind matrices take positions to the joints'
 pivots. The meshes are roots, as glTF wants skinned ones; one node above all joints turns and scales the scene.
 
+Corrective shapes are morph targets, which glTF adds before joints move a vertex; every mesh has those that change it.
+
 A packed file has positions of 16 bits, whose lattice the inverse bind matrices undo, and keys as fine as they need to be.
 
 Source: Khronos, glTF 2.0 specification, sections 3.7.3 (skins) and 3.11 (animations).
@@ -23,8 +25,9 @@ from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import Filtered, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.meshopt.writing import QUATERNION_BITS, pack_quaternions
+from gvpipe.io.gltf.morph_writing import write_deltas
 from gvpipe.io.gltf.quantizing import EXACT, FULL, POSITION_BITS, steps_of
-from gvpipe.io.gltf.scene_writing import Prepared, normals_of, prepare, write_scene
+from gvpipe.io.gltf.scene_writing import Prepared, Written, normals_of, prepare, write_scene
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS
 from gvpipe.io.scene.affine_nodes import AffineNodes, Keys, find_keys, moves
 from gvpipe.mesh.lattice import Lattice
@@ -37,6 +40,7 @@ STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a t
 LEAST_BITS = 4  # of quaternions
 COMPARED = 16  # frames, of those that lie evenly, and of those where joints are farthest from rest
 TINY, FLAT = 1e-100, 1e-6  # FLAT: of a cube's volume
+WEIGHT_STEP = 2.0**-13  # of corrective shapes, whose weights end at 1
 ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
 
 
@@ -89,6 +93,8 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     written = write_scene(glb, prepared, positions, shown, is_skinned=True)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
+    unit = 1.0 if lattice is None else lattice.step
+    shaped = _write_shapes(glb, written, skin, sources, unit, keys.precision / max(np.sqrt(len(skin.shapes)), 1) / unit)
     if skin.parents is None:
         numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
         tops = [outer for outer, _ in numbers]
@@ -102,7 +108,50 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     extent = extent_of(skin.bind)
     for clip in clips:
         own = keys if clip is clips[0] else find_keys(skin.part(clip.start, clip.stop))
-        _write_keys(glb, prepared.sequence.fps, clip.name, own, rest, numbers, extent)
+        number = _write_keys(glb, prepared.sequence.fps, clip.name, own, rest, numbers, extent)
+        _write_shape_keys(glb, number, prepared.sequence.fps, skin.shape_weights[clip.start : clip.stop], shaped)
+
+
+def _write_shapes(
+    glb: Glb, written: list[Written], skin: Skin, sources: Int64, unit: float, step: float
+) -> list[tuple[int, Int64]]:
+    """Add morph targets to meshes; returns nodes that have some, and which shapes ``(c,)`` these are.
+
+    Args:
+        written: the meshes.
+        sources: ``(W,)``, the skin's vertex of each that is written.
+        unit: of the file's positions.
+        step: how far off packed targets may be, in such units.
+    """
+    shaped = []
+    for one in written:
+        own = skin.shapes[:, sources[one.shape.start : one.shape.stop]] / np.float32(unit)
+        used = np.flatnonzero(own.any(axis=(1, 2)))
+        if not len(used):
+            continue
+        mesh = glb.tree["meshes"][one.mesh]
+        mesh["weights"] = _plain(skin.shape_weights[0, used])
+        targets = [{"POSITION": write_deltas(glb, own[number], "POSITION", step)} for number in used]
+        for primitive in mesh["primitives"]:
+            primitive["targets"] = targets
+        shaped.append((one.node, used))
+    return shaped
+
+
+def _write_shape_keys(glb: Glb, animation: int, fps: float, weights: Float64, shaped: list[tuple[int, Int64]]) -> None:
+    """Add the weights ``(F, C)`` of corrective shapes to an animation, a key in each frame."""
+    if not shaped:
+        return
+    tree = glb.tree["animations"][animation]
+    times = glb.block((np.arange(len(weights)) / fps).astype(np.float32)[:, None], bounds=True)
+    known: dict[bytes, int] = {}
+    for node, used in shaped:
+        if used.tobytes() not in known:
+            values = weights[:, used].reshape(-1, 1)
+            filtered = steps_of(values, WEIGHT_STEP) if glb.is_packed else None
+            known[used.tobytes()] = len(tree["samplers"])
+            tree["samplers"].append({"input": times, "output": glb.block(values.astype(np.float32), filtered=filtered)})
+        tree["channels"].append({"sampler": known[used.tobytes()], "target": {"node": node, "path": "weights"}})
 
 
 def _farthest(skin: Skin, other: Skin) -> float:
@@ -174,8 +223,11 @@ def _write_joint(glb: Glb, nodes: AffineNodes, j: int) -> tuple[int, int]:
 
 def _write_keys(
     glb: Glb, fps: float, name: str, keys: Keys, rest: AffineNodes, numbers: list[tuple[int, int]], extent: float
-) -> None:
-    """Add an animation: keys of what moves, or is not as at rest ``(J, ...)``; one that is, has keys of its first joint."""
+) -> int:
+    """Add an animation: keys of what moves, or is not as at rest ``(J, ...)``; one that is, has keys of its first joint.
+
+    Returns its number.
+    """
     times = (np.arange(len(keys.is_key)) / (keys.per_frame * fps)).astype(np.float32)[:, None]
     samplers: list[Json] = []
     channels: list[Json] = []
@@ -205,7 +257,7 @@ def _write_keys(
                 add(node, path, keys.is_key[:, j], values[:, j], step)
     if not channels:
         add(numbers[0][0], "translation", keys.is_key[:, 0], keys.nodes.translations[:, 0], keys.precision)
-    glb.append("animations", {"name": name, "samplers": samplers, "channels": channels, "extras": {FPS: fps}})
+    return glb.append("animations", {"name": name, "samplers": samplers, "channels": channels, "extras": {FPS: fps}})
 
 
 def _write_vectors(glb: Glb, values: Float64, step: float) -> int:

@@ -16,10 +16,11 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float32
 from gvpipe.io.gltf.clips import FPS
-from gvpipe.io.gltf.glb import VERTICES, Glb, glb_at
+from gvpipe.io.gltf.glb import Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
+from gvpipe.io.gltf.morph_writing import write_deltas
 from gvpipe.io.gltf.normal_writing import NORMAL
-from gvpipe.io.gltf.quantizing import EXACT, steps_of
+from gvpipe.io.gltf.quantizing import EXACT
 from gvpipe.io.gltf.scene_writing import Prepared, Written, frame_attributes, normals_of, prepare, write_scene
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.model.sequence import MeshSequence
@@ -27,7 +28,6 @@ from gvpipe.model.skin import extent_of
 
 MANY_TARGETS = 2048  # layers of a texture in most browsers, which hold a target each
 ROUNDING = 1e-6  # of a normal: triangles that do not turn may turn it by as much
-NORMAL_STEP = 1 / 1024  # of what targets of packed files add to normals
 SMALL_INTEGERS = ("float32", "int8", "uint8", "int16", "uint16")
 
 
@@ -96,19 +96,8 @@ class _Targets:
         digest = hashlib.sha256(b"".join(values.tobytes() for values in own.values())).digest()
         if digest not in self.known:
             self.known[digest] = len(self.accessors)
-            self.accessors.append({name: _write_deltas(glb, values, name, self.step) for name, values in own.items()})
+            self.accessors.append({name: write_deltas(glb, values, name, self.step) for name, values in own.items()})
         self.frames.append(self.known[digest])
-
-
-def _write_deltas(glb: Glb, deltas: Float32, name: str, step: float) -> int:
-    """Add what a target adds ``(n, 3)``, without its zeros if that is smaller, and return the number of its accessor."""
-    bounds = name == "POSITION"
-    moved = np.flatnonzero(deltas.any(axis=1))
-    index_size = 2 if len(deltas) <= 65536 else 4
-    if not glb.is_packed and len(moved) * (index_size + 12) < 12 * len(deltas):
-        return glb.sparse(deltas[moved], moved, (len(deltas), 3), bounds=bounds)
-    filtered = steps_of(deltas, step if bounds else NORMAL_STEP) if glb.is_packed else None
-    return glb.array(deltas, VERTICES, bounds=bounds, filtered=filtered)
 
 
 def _write_animation(glb: Glb, prepared: Prepared) -> int:

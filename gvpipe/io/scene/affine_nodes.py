@@ -23,7 +23,7 @@ BLOCK = 32  # joints that are looked at together; what that takes is many times 
 PER_FRAME = 4  # moments from a frame to the next: a power of two
 COARSEST = 32 * PER_FRAME  # moments of the longest span between keys
 AT_FRAMES, BETWEEN = 4e-6, 1e-3  # of the diagonal: how far off a joint may be, at frames and between them
-OF_ERROR = 0.02  # of a skin's error: the same, at frames
+OF_ERROR, OF_RMSE = 0.02, 0.3  # of a skin's largest error, and of its root mean square: the same, at frames
 OF_STEP = 0.15  # of the way from a frame to the next: the same, between them; an even turn by 60 degrees stays within
 EQUAL = 1e-6  # part of the largest scale by which scales may differ and count as equal
 
@@ -70,7 +70,7 @@ def find_keys(skin: Skin) -> Keys:
     """
     pivots = joint_pivots(skin)
     diagonal = extent_of(skin.bind)
-    at_frames = max(AT_FRAMES, 0.0 if np.isnan(skin.error) else OF_ERROR * skin.error)
+    at_frames = max(AT_FRAMES, np.nan_to_num(min(OF_ERROR * skin.error, OF_RMSE * skin.rmse)))
     if skin.parents is not None:
         return _find_tree_keys(skin, skin.parents, pivots, diagonal * at_frames)
     corners = _corners(*_boxes(skin), pivots)
@@ -98,22 +98,27 @@ def _find_tree_keys(skin: Skin, parents: Int32, pivots: Float64, precision: floa
     Where a parent grows, what its child is off by grows with it.
     """
     placed = moved_to(skin.transforms, pivots)
-    above = np.where(parents[None, :, None, None] >= 0, placed[:, np.maximum(parents, 0)], np.eye(4))
-    local: Float64 = np.asarray(np.linalg.solve(above, placed), np.float64)
-    order, depth = _from_roots(parents)
+    local = under_parents(placed, parents)
+    order, depth = from_roots(parents)
     low, high = _boxes(skin)
     for j in order[::-1]:
         if parents[j] >= 0:
             low[parents[j]], high[parents[j]] = np.minimum(low[parents[j]], low[j]), np.maximum(high[parents[j]], high[j])
     corners, nodes = _corners(low, high, pivots), factor(local)
-    grown = float(np.cbrt(np.abs(np.linalg.det(above[..., :3, :3]))).max(initial=1.0))
+    grown = float(np.cbrt(np.abs(np.linalg.det(placed[:, parents[parents >= 0], :3, :3]))).max(initial=1.0))
     shared = precision / (depth.max() + 1) / grown
     is_key = _choose(nodes, local, corners, np.full(local.shape[:2], shared))
     reach = np.linalg.norm(corners[:, :, :3], axis=2).max(axis=1)
     return Keys(nodes, is_key, pivots, reach, shared, 1)
 
 
-def _from_roots(parents: Int32) -> tuple[list[int], Int64]:
+def under_parents(placed: Float64, parents: Int32) -> Float64:
+    """Transforms ``(F, J, 4, 4)`` of a scene, each relative to its parent's, if it has one."""
+    above = np.where(parents[None, :, None, None] >= 0, placed[:, np.maximum(parents, 0)], np.eye(4))
+    return np.asarray(np.linalg.solve(above, placed), np.float64)
+
+
+def from_roots(parents: Int32) -> tuple[list[int], Int64]:
     """Joints, each after its parent; and how many are above each."""
     depth = np.full(len(parents), -1)
     depth[parents < 0] = 0

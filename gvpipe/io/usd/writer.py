@@ -30,7 +30,6 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
 ROOT = "root"  # of meshes that have no common node
-FLAT_TREE = "joints are written side by side; which is below which is left out (a .glb has it)"
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
 
@@ -127,7 +126,6 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
         for one, mesh in pairs:
             PointsWriter(one, start, is_sampled=False).write(0, np.ascontiguousarray(skin.bind[slice(*mesh.vertices)]))
         write_skeleton(stage, f"/{root}", skin, pairs, start, name)
-        said += [FLAT_TREE] if skin.parents is not None else []
         said += _write_bind_normals(sequence, pairs, normals, is_first_frame(skin))
         if sequence.origin.any():
             UsdGeom.Xformable(top).AddTranslateOp().Set(Gf.Vec3d(*sequence.origin.tolist()))
