@@ -30,6 +30,7 @@ from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
+from gvpipe.model.warp import warped
 from gvpipe.playback.files import Source, frame_range, read
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -150,6 +151,8 @@ def encode(
     memory: int | None = None,
     workers: int | str | None = None,
     scheduler: str | None = None,
+    real_time: bool = False,
+    warp: str | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -175,7 +178,7 @@ def encode(
         fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited: as for `read`.
+        clip, mesh, frames, unlimited, real_time, warp: as for `read`.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
@@ -202,7 +205,7 @@ def encode(
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = _StageClock(progress)
     with open_executor(scheduler, workers) as executor:
-        options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
+        options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited, "real_time": real_time, "warp": warp}
         sequence = _open_source(source, path, fps, options)
         if memory is not None:
             given = fit_segments(given, sequence.n_vertices, memory)
@@ -491,6 +494,7 @@ def _open_source(
     if isinstance(source, MeshSequence):
         frames = options["frames"]
         source = source if frames is None else source.part(*frame_range(source, *frames))
+        source = source if options["warp"] is None else warped(source, options["warp"])
         return source if fps is None else source.with_fps(fps)
     if not isinstance(source, list | tuple):
         check_path(source, "gvpipe.encode's source", "a MeshSequence or ")

@@ -110,6 +110,15 @@ unlimited_option = click.option(
     help="Let a geometry video or a USD file take whatever memory and time it asks for: you trust its source.",
 )
 
+real_time_option = click.option(
+    "--real-time",
+    is_flag=True,
+    help="Keep a simulation's clock. [default: steps under 1/240 s or over 2 s become 25 frames a second; times are kept]",
+)
+warp_option = click.option(
+    "--warp", metavar="NAME[:SCALE]", help="Move vertices by a field of displacements, SCALE times as far. [default scale: 1]"
+)
+
 
 def output_options(command: Command) -> Command:
     """Give a command ``--json``, ``--quiet`` and ``--verbose``, and call it with ``out``, an `Output`."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.cli.console import Output, compress_option, output_options, unlimited_option
+from gvpipe.cli.console import Output, compress_option, output_options, real_time_option, unlimited_option, warp_option
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import shape as shape_of
@@ -53,6 +53,8 @@ if TYPE_CHECKING:
 )
 @click.option("--target-kg", type=float, help="Largest KG error of the skeleton, percent. [default: 0.14]")
 @click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
+@real_time_option
+@warp_option
 @compress_option
 @unlimited_option
 @output_options
@@ -73,6 +75,8 @@ def convert(
     correctives: int | None,
     target_kg: float | None,
     max_error: str | None,
+    real_time: bool,
+    warp: str | None,
     compress: str,
     unlimited: bool,
     out: Output,
@@ -108,13 +112,14 @@ def convert(
                 "--split goes with --frames, and not with --clip all, --start, --stop, --lod or an OUTPUT of -"
             )
         options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), "unlimited": unlimited}
+        options |= {"real_time": real_time, "warp": warp}
         _convert_split(source, target, options, parts, wanted if skin else None, compress, out)
         return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         read = (
             _level_reader(given, lod, unlimited)
             if lod
-            else partial(files.read, given, clip=clip, mesh=mesh, unlimited=unlimited)
+            else partial(files.read, given, clip=clip, mesh=mesh, unlimited=unlimited, real_time=real_time, warp=warp)
         )
         clips: tuple[Clip, ...] = ()
         if clip == ALL and (names := clip_names(given)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.cli.console import unlimited_option
+from gvpipe.cli.console import real_time_option, unlimited_option, warp_option
 
 if TYPE_CHECKING:
     from gvpipe.coding.codec import Codec
@@ -58,6 +58,8 @@ OPTIONS = (
     click.option("--clip", metavar="NAME", help="The animation to read, of a file that has several. [default: the first]"),
     click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy)."),
     click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out."),
+    real_time_option,
+    warp_option,
     click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp."),
     click.option(
         "--stream",
@@ -121,7 +123,9 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
         lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
         frozenset(settings),
     )
-    reading = {name: options[name] for name in ("fps", "clip", "mesh")} | {"frames": parse_frames(options["frames"])}
+    reading = {name: options[name] for name in ("fps", "clip", "mesh", "real_time", "warp")} | {
+        "frames": parse_frames(options["frames"])
+    }
     making = {**targets, "textures": options["textures"], "stream": options["stream"], "bare": options["bare"]}
     making["memory"] = None if options["memory"] is None else parse_bytes("--memory", options["memory"])
     making["attributes"] = _parse_bounds("--attribute", options["attributes"])

@@ -19,6 +19,7 @@ class ReadOptions:
         frames: first frame that is read, and the one after the last (None: all that follow). Simulations whose topology
             changes are read from frame to frame where it does not.
         unlimited: whether a library that runs in a process of its own may take any memory.
+        real_time: whether steps of a simulation keep their clock, however many there are a second.
     """
 
     fps: float | None = None
@@ -26,6 +27,7 @@ class ReadOptions:
     mesh: str | os.PathLike[str] | None = None
     frames: tuple[int, int | None] | None = None
     unlimited: bool = False
+    real_time: bool = False
 
     def span(self, n_frames: int, where: str) -> tuple[int, int]:
         """First frame of a file of ``n_frames``, and the one after the last; ``where`` is the file, for messages.

@@ -28,6 +28,7 @@ def read(
     mesh: str | os.PathLike[str] | None = None,
     frames: tuple[int, int | None] | None = None,
     unlimited: bool = False,
+    real_time: bool = False,
 ) -> MeshSequence:
     """Read a mesh sequence.
 
@@ -42,12 +43,14 @@ def read(
         mesh: a file with the triangles of a point cache.
         frames: first frame that is read, and the one after the last (None: all that follow).
         unlimited: whether OpenUSD may take any memory (`gvpipe.io.usd.worker`).
+        real_time: whether steps of a simulation keep their clock, however many there are a second; else the film has a rate
+            that a person can watch (`gvpipe.io.simulation.times`).
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
-    options = ReadOptions(fps, clip, mesh, frames, unlimited)
+    options = ReadOptions(fps, clip, mesh, frames, unlimited, real_time)
     if isinstance(path, str) and is_stored(path):
         from gvpipe.io.store_files import read_stored
 
@@ -55,8 +58,9 @@ def read(
     else:
         sequence = _read(path, options)
     from gvpipe.foundation.notes import left_behind
+    from gvpipe.model.warp import warp_hint
 
-    said = (*cut_notes(sequence.images), *left_behind(sequence.not_carried))
+    said = (*cut_notes(sequence.images), *warp_hint(sequence), *left_behind(sequence.not_carried))
     return replace(sequence, notes=(*sequence.notes, *said)) if said else sequence
 
 
@@ -90,7 +94,7 @@ def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], optio
 def _read_frames(path: str | list[str], options: ReadOptions) -> MeshSequence:
     from gvpipe.io.frames.reader import read_frames
 
-    return read_frames(path, options.fps, options.frames)
+    return read_frames(path, options.fps, options.frames, options.real_time)
 
 
 READERS = scene_readers(read)

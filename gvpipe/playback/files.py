@@ -31,6 +31,8 @@ def read(
     frames: tuple[int, int | None] | None = None,
     *,
     unlimited: bool = False,
+    real_time: bool = False,
+    warp: str | None = None,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
@@ -42,22 +44,43 @@ def read(
         mesh: a file with the triangles of a point cache.
         frames: first frame that is read, and the one after the last (None: all that follow).
         unlimited: as for `open`, of a geometry video; of a USD file, whether it may take any memory.
+        real_time: whether steps of a simulation keep their clock; else those that are shorter than 1/240 s or longer than 2 s
+            become a film of 25 frames a second. The times are kept either way.
+        warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
+        SettingError: ``warp`` is of another form.
         TypeError: it is no path.
     """
+    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time)
+    if warp is None:
+        return sequence
+    from gvpipe.model.warp import warped
+
+    return warped(sequence, warp)
+
+
+def _read(
+    path: Source,
+    fps: float | None,
+    clip: str | None,
+    mesh: StrPath | None,
+    frames: tuple[int, int | None] | None,
+    unlimited: bool,
+    real_time: bool,
+) -> MeshSequence:
     from gvpipe.io.reading import read as read_sequence
 
     if isinstance(path, list | tuple):
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps, clip, mesh, frames, unlimited)
+            return read_sequence(path, fps, clip, mesh, frames, unlimited, real_time)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_remote(one):
-        return read_sequence(one, fps, clip, mesh, frames, unlimited)
+        return read_sequence(one, fps, clip, mesh, frames, unlimited, real_time)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     if mesh is not None:
@@ -78,6 +101,8 @@ def read_runs(
     frames: tuple[int, int | None] | None = None,
     *,
     unlimited: bool = False,
+    real_time: bool = False,
+    warp: str | None = None,
 ) -> list[Run]:
     """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
 
@@ -88,7 +113,9 @@ def read_runs(
     """
     from gvpipe.io.runs import find_runs
 
-    return find_runs(lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited), frames)
+    return find_runs(
+        lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited, real_time=real_time, warp=warp), frames
+    )
 
 
 def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | None = None, compress: str = "none") -> list[str]:

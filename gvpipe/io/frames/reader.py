@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
+from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.frames.columns import split_columns
 from gvpipe.io.frames.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.frames.frame_files import FrameFiles
@@ -16,7 +17,10 @@ from gvpipe.model.sequence import MeshSequence
 
 
 def read_frames(
-    path: str | Sequence[str], fps: float | None = None, span: tuple[int, int | None] | None = None
+    path: str | Sequence[str],
+    fps: float | None = None,
+    span: tuple[int, int | None] | None = None,
+    real_time: bool = False,
 ) -> MeshSequence:
     """Read a folder, glob, pattern, list or single file of frames; what is static is that of the first.
 
@@ -24,6 +28,7 @@ def read_frames(
         path: what names the files.
         fps: frames per second.
         span: number of the first file that is read, and of the one after the last (None: all that follow).
+        real_time: whether files that tell their times keep that clock (`gvpipe.io.simulation.times`).
 
     Raises:
         InputError: no frames, gaps, mixed formats, or a first frame that cannot be read.
@@ -45,7 +50,7 @@ def read_frames(
     frames.forget_animated()
     if fps is None and len(files) > 1:
         noticed = (*noticed, ASSUMED_FPS)
-    return MeshSequence(
+    made = MeshSequence(
         frames,
         first.faces,
         DEFAULT_FPS if fps is None else fps,
@@ -61,3 +66,5 @@ def read_frames(
         first.metadata,
         tuple(dict.fromkeys([*first.not_carried, *columns.not_carried, *later])),
     )
+    timed = FRAME_FORMATS[frames.paths[0].suffix.lower()].timed
+    return made if timed is None or len(frames.paths) < 2 else timed(made, frames.paths, fps, real_time)

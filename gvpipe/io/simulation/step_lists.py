@@ -22,7 +22,8 @@ from gvpipe.io.frames.columns import split_columns
 from gvpipe.io.frames.frame_files import FrameFiles
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
-from gvpipe.io.simulation.dataset import Dataset, field_data
+from gvpipe.io.simulation.dataset import Dataset
+from gvpipe.io.simulation.file_times import TOLD
 from gvpipe.io.simulation.frame_loader import dataset_loader
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.steps import read_steps
@@ -32,7 +33,6 @@ from gvpipe.model.sequence import MeshSequence
 
 Listed = tuple[float, str, str]  # time, file, part
 LARGEST_LIST = 64 << 20  # bytes of a list: a million files
-TIMES = [field_data(name) for name in ("TimeValue", "TIME", "CYCLE")]  # of each file, which the list tells, too
 
 
 def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
@@ -75,7 +75,7 @@ def read_listed(
         raise InputError(f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEPS)} are needed")
     frames = FrameFiles(files, start)
     first, columns = frames.first, split_columns(frames)
-    timing = time_steps(times, len(files), options.fps)
+    timing = time_steps(times, len(files), options.fps, options.real_time)
     metadata = replace(first.metadata, start_time=timing.start, source=path.name, texts=timing.texts)
     return MeshSequence(
         frames,
@@ -89,7 +89,7 @@ def read_listed(
         first.parts,
         first.polygons,
         metadata=metadata,
-        not_carried=tuple(name for name in (*first.not_carried, *columns.not_carried) if name not in TIMES),
+        not_carried=tuple(name for name in (*first.not_carried, *columns.not_carried) if name not in TOLD),
     )
 
 

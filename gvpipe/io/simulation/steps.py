@@ -21,6 +21,7 @@ from gvpipe.io.damage import reading
 from gvpipe.io.mesh import FrameValues, too_wide
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
+from gvpipe.io.simulation.pieces import without_duplicates
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.times import empty_note, time_steps
 from gvpipe.model.origin import choose_origin, narrow, rounding
@@ -64,7 +65,7 @@ class StepFrames:
         self._steps, self.start, self._path = steps, first, path
         self._n_frames = stop - first
         self._lock = ForkLock()  # HDF5 and netCDF files are read by one thread at a time
-        self.first = self.guarded(0, lambda: steps.open(first))
+        self.first = self.guarded(0, lambda: without_duplicates(steps.open(first)))
         self._cells = self.guarded(0, self.first.cells)
         self._n_points = -1
         points = self.guarded(0, self.first.points)
@@ -101,7 +102,7 @@ class StepFrames:
 
     def open(self, frame: int) -> Dataset:
         """The step of a frame; raises `InputError` if its cells are not those of the first."""
-        step = self.guarded(frame, lambda: self._steps.open(self.start + frame))
+        step = self.guarded(frame, lambda: without_duplicates(self._steps.open(self.start + frame)))
         cells = self.guarded(frame, step.cells)
         if not cells.equals(self._cells):
             raise self._changed(frame, f"{len(cells.types)} cells, {len(self._cells.types)} at first, or other corners")
@@ -164,7 +165,7 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
     frames = StepFrames(steps, first, stop, path)
     attributes, fields, left = _split(frames, str(path))
     times = steps.times
-    timing = time_steps(None if times is None else times[first:stop], stop - first, options.fps)
+    timing = time_steps(None if times is None else times[first:stop], stop - first, options.fps, options.real_time)
     return MeshSequence(
         frames,
         frames.surface.faces,

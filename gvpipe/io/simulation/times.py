@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,9 @@ from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS
 
 EVEN = 1e-3  # part of the mean step: steps that differ by less are even, as rounded decimals are
 SLOWEST, FASTEST = 1e-6, 100_000.0  # frames per second that a sequence can have
+SLOWEST_SHOWN, FASTEST_SHOWN = 0.5, 240.0  # that a person can watch
+WATCHED = 25.0  # frames per second, where steps are slower or faster than that
+ROUNDING = 1e-12  # of a time: what follows from the rate to this is not kept beside it
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class Timing:
     Args:
         fps: frames per second.
         start: time of the first frame, seconds.
-        texts: the times of uneven steps, for `gvpipe.Metadata.texts`.
+        texts: the times that do not follow from the rate, for `gvpipe.Metadata.texts`: each with all its digits.
         notes: a line each.
     """
 
@@ -31,13 +33,14 @@ class Timing:
     notes: tuple[str, ...]
 
 
-def time_steps(times: Float64 | None, n_frames: int, fps: float | None) -> Timing:
-    """Return when the frames are, one per step; the rate follows from the mean step.
+def time_steps(times: Float64 | None, n_frames: int, fps: float | None, real_time: bool = False) -> Timing:
+    """Return when the frames are, one per step; the rate follows from the mean step, where a person can watch that.
 
     Args:
         times: ``(F,)`` of the steps, seconds; None: the file has none.
         n_frames: F.
         fps: frames per second instead of the file's.
+        real_time: whether the rate is that of the steps, however fast or slow.
     """
     if times is None or not np.isfinite(times).all():
         return Timing(fps or DEFAULT_FPS, 0.0, {}, () if fps or n_frames < 2 else (ASSUMED_FPS,))
@@ -46,22 +49,29 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None) -> Timin
         return Timing(fps or DEFAULT_FPS, start, {}, ())
     steps = np.diff(times)
     mean = float(times[-1] - start) / (n_frames - 1)
-    texts = {"times": " ".join(f"{time:.9g}" for time in times)}
+    texts = {"times": " ".join(repr(time).removesuffix(".0") for time in times.tolist())}
     if not (steps > 0).all() or not SLOWEST <= 1 / mean <= FASTEST:
         why = "do not rise" if not (steps > 0).all() else f"are {mean:.3g} s apart"
-        rate = fps or DEFAULT_FPS
+        rate = fps or (WATCHED if (steps > 0).all() and not real_time else DEFAULT_FPS)
         return Timing(
             rate, start, texts, (f"the steps' times {why}; frames are {rate:g} a second, the times are kept as text",)
         )
+    is_shown = real_time or SLOWEST_SHOWN <= 1 / mean <= FASTEST_SHOWN
+    rate = fps or (_whole(1 / mean) if is_shown else WATCHED)
+    follow = np.allclose(start + np.arange(n_frames) / rate, times, rtol=ROUNDING, atol=ROUNDING * mean)
+    kept = {} if follow else texts
+    if fps is None and not is_shown:
+        watched = (
+            f"steps are {mean:.3g} s apart, so that {n_frames} frames are shown at {rate:g} a second; the times are kept "
+            "(--real-time shows them as they passed)",
+        )
+        return Timing(rate, start, kept, watched)
     is_even = bool((np.abs(steps - mean) <= EVEN * mean).all())
-    rate = fps or _whole(1 / mean)
-    if is_even and (fps is None or math.isclose(fps, 1 / mean, rel_tol=EVEN)):
-        return Timing(rate, start, {}, ())
     said = () if is_even else (
         f"time steps are uneven, {steps.min():.3g} to {steps.max():.3g} s; frames are {rate:.6g} a second, "
         "the times are kept as text",
     )  # fmt: skip
-    return Timing(rate, start, texts, said)
+    return Timing(rate, start, kept, said)
 
 
 def _whole(rate: float) -> float:

@@ -1,13 +1,13 @@
 """XDMF files (.xdmf, .xmf), as dolfinx, FEniCS and meshio write them: an XML file that names grids, and HDF5 beside it.
 
-A temporal collection has a grid per step. Collections of equal length are the functions of one simulation: all their attributes
-are read. FEniCS's finite-element functions are read at the corners of their cells. Source: XDMF, "XDMF model and format";
-for functions, vtkXdmfReader of VTK 9.7.
+A temporal collection has a grid per step, or a spatial collection, whose grids are blocks. Collections of equal length are the
+functions of one simulation: all their attributes are read. FEniCS's finite-element functions are read at the corners of their
+cells. Source: XDMF, "XDMF model and format"; for functions, vtkXdmfReader of VTK 9.7.
 """
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,16 +17,19 @@ import numpy as np
 from gvpipe.foundation.arrays import Array, Float64, Floats
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
+from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.cells import SIZES, Cells, equal_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xdmf_items import Items
+from gvpipe.io.simulation.xdmf_references import References
 from gvpipe.io.simulation.xml_root import parse_xml
 from gvpipe.model.sequence import MeshSequence
 
 LARGEST_XML = 256 << 20  # bytes
-INCLUDE = "{http://www.w3.org/2001/XInclude}include"
-NAMED = re.compile(r"""//Grid\[@Name=["']([^"']*)["']\]/\*\[self::Topology or self::Geometry\]""")
+MOST_BLOCKS = 10_000
+MOST_KNOWN = 100  # blocks whose cells are kept from step to step
+MOST_DEPTH = 50  # of collections in collections
 # VTK's type by name, and by the number that mixed topologies have
 NAMES = {"TRIANGLE": 5, "QUADRILATERAL": 9, "TETRAHEDRON": 10, "PYRAMID": 14, "WEDGE": 13, "HEXAHEDRON": 12, "TRIANGLE_6": 22,
          "TRI_6": 22, "QUADRILATERAL_8": 23, "QUAD_8": 23, "QUADRILATERAL_9": 28, "QUAD_9": 28, "TETRAHEDRON_10": 24,
@@ -54,6 +57,15 @@ def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
     return read_steps(steps, path, options)
 
 
+def _is_uniform(grid: ElementTree.Element) -> bool:
+    return grid.get("GridType", "Uniform") == "Uniform"
+
+
+def _is_spatial(grid: ElementTree.Element) -> bool:
+    kind = grid.get("GridType")
+    return kind == "Tree" or (kind == "Collection" and grid.get("CollectionType", "Spatial") == "Spatial")
+
+
 def _others(grids: list[ElementTree.Element]) -> list[str]:
     """What grids have beside a mesh and its numbers."""
     found = [each for grid in grids for each in grid if each.tag == "Set"]
@@ -65,8 +77,8 @@ class XdmfSteps:
 
     def __init__(self, path: Path) -> None:
         root = _parse(path)
-        self._items = Items(path)
-        self._grids = {grid.get("Name", ""): grid for grid in root.iter("Grid") if grid.find("Topology") is not None}
+        self._references = References(root)
+        self._items = Items(path, self._references)
         temporal = [grid for grid in root.iter("Grid") if grid.get("CollectionType") == "Temporal"]
         if temporal:
             columns = [collection.findall("Grid") for collection in temporal]
@@ -74,7 +86,8 @@ class XdmfSteps:
             taken = [each for each, c in zip(temporal, columns, strict=True) if len(c) == len(columns[0])]
             self.times: Float64 | None = self._times(temporal[0], [grids[0] for grids in self._steps])
         else:
-            found = [grid for grid in root.findall("Domain/Grid") if grid.get("GridType", "Uniform") == "Uniform"]
+            every = [self._references.target(grid) for grid in root.findall("Domain/Grid")]
+            found = [grid for grid in every if _is_uniform(grid) or _is_spatial(grid)]
             self._steps = [[found[0]]] if found else []
             self.times, taken = None, found[:1]
         if not self._steps:
@@ -92,14 +105,32 @@ class XdmfSteps:
             for grid in root.findall("Domain/Grid")
             if not temporal and grid not in taken
         ]
-        self._known: tuple[str, Cells] | None = None
+        self._known: dict[str, Cells] = {}
 
     def open(self, step: int) -> Dataset:
         """A step; its numbers are read when they are called for."""
-        grids = self._steps[step]
-        for grid in grids:
-            if grid.get("GridType", "Uniform") != "Uniform":
-                raise ValueError(f"its grid {grid.get('Name', '')[:40]!r} is a {grid.get('GridType')}, which is not read")
+        columns = [list(self._blocks(grid, 0)) for grid in self._steps[step]]
+        columns = [each for each in columns if len(each) == len(columns[0])]
+        if len(columns[0]) > MOST_BLOCKS:
+            raise ValueError(f"a step has {len(columns[0])} blocks; at most {MOST_BLOCKS} are read")
+        if len(columns[0]) == 1 and _is_uniform(self._steps[step][0]):
+            return self._open([grids[0][1] for grids in columns])
+        named = [(column[0][0], self._open([grid for _, grid in column])) for column in zip(*columns, strict=True)]
+        return join_blocks(named)
+
+    def _blocks(self, grid: ElementTree.Element, depth: int) -> Iterator[tuple[str, ElementTree.Element]]:
+        """Names and grids of a step: itself, or those that its spatial collection has."""
+        grid = self._references.target(grid)
+        if _is_uniform(grid):
+            yield grid.get("Name", ""), grid
+        elif _is_spatial(grid) and depth < MOST_DEPTH:
+            for each in grid.findall("Grid"):
+                yield from self._blocks(each, depth + 1)
+        else:
+            raise ValueError(f"its grid {grid.get('Name', '')[:40]!r} is a {grid.get('GridType')}, which is not read")
+
+    def _open(self, grids: list[ElementTree.Element]) -> Dataset:
+        """A mesh, and the numbers of all grids that are of it."""
         topology, geometry = self._part(grids[0], "Topology"), self._part(grids[0], "Geometry")
         cells = self._cells(topology)
         point_data: dict[str, DataArray] = {}
@@ -120,23 +151,20 @@ class XdmfSteps:
         return Dataset(partial(self._points, geometry), lambda: cells, point_data, cell_data, not_carried=lost)
 
     def _part(self, grid: ElementTree.Element, tag: str) -> ElementTree.Element:
-        """A grid's topology or geometry, its own or that of the grid it includes."""
-        own = grid.find(tag)
-        if own is not None and own.find("DataItem") is not None:
-            return own
-        for include in grid.findall(INCLUDE):
-            named = NAMED.search(include.get("xpointer", ""))
-            other = self._grids.get(named.group(1)) if named and not include.get("href") else None
-            if other is not None and other.find(tag) is not None:
-                return other.find(tag)  # type: ignore[return-value]  # it was found
-        raise ValueError(f"grid {grid.get('Name', '')[:40]!r} has no {tag}")
+        """A grid's topology or geometry, its own or that of the grid it refers to."""
+        found = self._references.child(grid, tag)
+        if found is None:
+            raise ValueError(f"grid {grid.get('Name', '')[:40]!r} has no {tag}")
+        return found
 
     def _cells(self, topology: ElementTree.Element) -> Cells:
         """The same object for steps that name the same numbers."""
         key = ElementTree.tostring(topology, "unicode")
-        if self._known is None or self._known[0] != key:
-            self._known = (key, self._read_cells(topology))
-        return self._known[1]
+        if key not in self._known:
+            if len(self._known) >= MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = self._read_cells(topology)
+        return self._known[key]
 
     def _read_cells(self, topology: ElementTree.Element) -> Cells:
         kind = (topology.get("TopologyType") or topology.get("Type") or "").upper()

@@ -15,29 +15,43 @@ from gvpipe.foundation.arrays import Array
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file
+from gvpipe.io.simulation.xdmf_functions import evaluate
+from gvpipe.io.simulation.xdmf_references import References
 
 KINDS = {"FLOAT": "f", "INT": "i", "UINT": "u", "CHAR": "i", "UCHAR": "u"}
+MOST_DEPTH = 20  # of items in items
 SIZES = {"CHAR": 1, "UCHAR": 1}
 
 
 class Items:
     """Reads the arrays of one XDMF file; HDF5 files stay open."""
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._size = path, path.stat().st_size
+    def __init__(self, path: Path, references: References) -> None:
+        self._path, self._size, self._references = path, path.stat().st_size, references
         self._open: dict[Path, HdfFile] = {}
 
-    def read(self, item: ElementTree.Element) -> Array:
+    def read(self, item: ElementTree.Element, depth: int = 0) -> Array:
         """The numbers of a DataItem, in its dimensions.
+
+        Args:
+            item: of the file.
+            depth: how many items it is nested in.
 
         Raises:
             ValueError: a form that is not read, a file that is missing or outside the folder, or too few numbers.
         """
-        if item.get("ItemType", "Uniform").lower() == "hyperslab":
-            return self._slab(item)
-        if item.get("ItemType", "Uniform").lower() != "uniform" or item.get("Reference"):
-            raise ValueError(f"a DataItem is a {item.get('ItemType') or 'reference'}, which is not read")
-        shape = tuple(int(word) for word in (item.get("Dimensions") or "").split())
+        item = self._references.target(item)
+        kind = item.get("ItemType", "Uniform").lower()
+        if depth > MOST_DEPTH:
+            raise ValueError(f"its DataItems are nested more than {MOST_DEPTH} deep")
+        if kind == "hyperslab":
+            return self._slab(item, depth)
+        if kind == "function":
+            made = evaluate(item.get("Function", ""), [self.read(each, depth + 1) for each in item.findall("DataItem")])
+            return made.reshape(_shape(item) or made.shape)
+        if kind != "uniform":
+            raise ValueError(f"a DataItem is a {item.get('ItemType')}, which is not read")
+        shape = _shape(item)
         form = (item.get("Format") or "XML").upper()
         text = (item.text or "").strip()
         if form == "HDF":
@@ -69,13 +83,13 @@ class Items:
             raise ValueError(f"{text!r} has {file.stat().st_size} bytes; {count * dtype.itemsize} from {seek} on are needed")
         return np.fromfile(file, dtype, count, offset=seek)
 
-    def _slab(self, item: ElementTree.Element) -> Array:
+    def _slab(self, item: ElementTree.Element, depth: int) -> Array:
         """Part of an array: starts, strides and counts, and the array that they are of."""
         children = item.findall("DataItem")
         if len(children) != 2:
             raise ValueError(f"a HyperSlab has {len(children)} DataItems; 2 are needed")
-        start, stride, count = self.read(children[0]).astype(np.int64).reshape(3, -1)
-        whole = self.read(children[1])
+        start, stride, count = self.read(children[0], depth + 1).astype(np.int64).reshape(3, -1)
+        whole = self.read(children[1], depth + 1)
         if len(start) != whole.ndim or (start < 0).any() or (stride < 1).any() or (count < 1).any():
             raise ValueError("a HyperSlab has starts, strides and counts that cannot be")
         if (start + (count - 1) * stride >= whole.shape).any():
@@ -84,6 +98,10 @@ class Items:
             slice(a, a + n * step, step) for a, step, n in zip(start.tolist(), stride.tolist(), count.tolist(), strict=True)
         )
         return whole[part]
+
+
+def _shape(item: ElementTree.Element) -> tuple[int, ...]:
+    return tuple(int(word) for word in (item.get("Dimensions") or "").split())
 
 
 def _dtype(item: ElementTree.Element) -> np.dtype[np.generic]:

@@ -119,7 +119,8 @@ def test_times_that_a_list_tells(tmp_path: Path) -> None:
     rows = "".join(f'<DataSet timestep="{step}" file="a_{step}.vtu"/>' for step in (0, 1))
     (tmp_path / "a.pvd").write_text(f'<VTKFile type="Collection" version="0.1"><Collection>{rows}</Collection></VTKFile>')
     assert gvpipe.read(tmp_path / "a.pvd").not_carried == ()
-    assert gvpipe.read(str(tmp_path / "a_%d.vtu")).not_carried == ("field data 'TimeValue'",)
+    assert gvpipe.read(str(tmp_path / "a_%d.vtu")).not_carried == ()
+    assert gvpipe.read(tmp_path / "a_0.vtu").not_carried == ("field data 'TimeValue'",)
 
 
 def test_what_vtkhdf_has_beside(tmp_path: Path) -> None:

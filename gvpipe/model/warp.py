@@ -1,0 +1,98 @@
+"""Positions moved by a field of displacements, as engineers look at simulations ("warp by vector")."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gvpipe.foundation.arguments import show
+from gvpipe.foundation.arrays import Array, Float32
+from gvpipe.foundation.errors import InputError, SettingError
+from gvpipe.model.sequence import MeshSequence
+
+USUAL = ("displacement", "displacements", "disp", "displ", "u", "depl")  # names of what moves a mesh, in lower case
+STILL = 1e-9  # of the largest coordinate
+
+
+class Warped:
+    """Frames of a sequence, ``(F, V, 3)``, with the scaled numbers of each frame added, when they are read."""
+
+    def __init__(self, sequence: MeshSequence, name: str, scale: float) -> None:
+        self._sequence, self._name, self._scale = sequence, name, scale
+        self.shape: tuple[int, ...] = (sequence.n_frames, sequence.n_vertices, 3)
+
+    def __getitem__(self, key: slice, /) -> Float32:
+        start, stop, _ = key.indices(self.shape[0])
+        positions = self._sequence.read(start, stop).astype(np.float64)
+        positions += self._scale * _moves(self._sequence, self._name, start, stop)
+        return positions.astype(np.float32)
+
+
+def parse_warp(text: str) -> tuple[str, float]:
+    """The name and the scale of ``NAME`` or ``NAME:SCALE``.
+
+    Raises:
+        SettingError: there is no name, or the scale is no finite number.
+
+    Examples:
+        >>> parse_warp("displacement:2.5"), parse_warp("U"), parse_warp("a:b")
+        (('displacement', 2.5), ('U', 1.0), ('a:b', 1.0))
+    """
+    name, colon, last = text.rpartition(":")
+    try:
+        found = (name, float(last)) if colon else (text, 1.0)
+    except ValueError:
+        found = (text, 1.0)
+    if not found[0] or not np.isfinite(found[1]):
+        raise SettingError(f"warp is {show(text)}; NAME or NAME:SCALE is needed, such as displacement:10")
+    return found
+
+
+def warped(sequence: MeshSequence, text: str) -> MeshSequence:
+    """A sequence whose vertices are moved by a field or an attribute.
+
+    Args:
+        sequence: to move; its field stays as it is.
+        text: ``NAME`` or ``NAME:SCALE`` of three numbers a vertex (two: in x and y), model units.
+
+    Raises:
+        InputError: it has no such numbers.
+        SettingError: `text` is of another form.
+    """
+    name, scale = parse_warp(text)
+    if name not in movers(sequence):
+        known = ", ".join(map(repr, movers(sequence))) or "none"
+        raise InputError(f"{sequence.name} has no vectors {name!r} on its vertices to warp by; it has {known}")
+    frames = Warped(sequence, name, scale)
+    notes = tuple(note for note in sequence.notes if not note.startswith(HINT))
+    return replace(sequence, positions=frames, notes=(*notes, f"positions are moved by {scale:g} times {name!r}"))
+
+
+HINT = "the mesh stands still; "
+
+
+def warp_hint(sequence: MeshSequence) -> tuple[str, ...]:
+    """A note where a mesh stands still and has a field of displacements."""
+    named = [name for name in sequence.fields if name in movers(sequence) and name.lower() in USUAL]
+    if not named or sequence.n_frames < 2:
+        return ()
+    first = sequence.read(0, 1)[0]
+    for k in sorted({sequence.n_frames // 2, sequence.n_frames - 1}):
+        if np.abs(sequence.read(k, k + 1)[0] - first).max(initial=0) > STILL * np.abs(first).max(initial=0):
+            return ()
+    return (f"{HINT}--warp {named[0]} moves it by its field {named[0]!r} (--warp {named[0]}:10 ten times as far)",)
+
+
+def movers(sequence: MeshSequence) -> list[str]:
+    """Names of fields and attributes that can move vertices."""
+    widths = {name: (one.domain, np.asarray(one).shape[1]) for name, one in sequence.attributes.items()}
+    widths |= {name: (one.domain, one.n_components) for name, one in sequence.fields.items()}
+    return [name for name, (domain, width) in widths.items() if domain == "vertex" and width in (2, 3)]
+
+
+def _moves(sequence: MeshSequence, name: str, start: int, stop: int) -> Array:
+    field = sequence.fields.get(name)
+    values = np.asarray(sequence.attributes[name])[None] if field is None else field.read(start, stop)
+    values = values.astype(np.float64)
+    return values if values.shape[2] == 3 else np.concatenate([values, np.zeros((*values.shape[:2], 1))], axis=2)
