@@ -137,7 +137,7 @@ def convert(
             start, stop = files.frame_range(whole, first, last)
             some = whole.part(start, stop)
         sequence = chosen(some, parts, None, "convert", progress)
-        found, said = find_skin(sequence, wanted, progress) if skin else (None, [])
+        found, said = find_skin(sequence, path, wanted, progress) if skin else (None, [])
         found = found and replace(found, clips=clips)
         noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
         noticed += smaller_without(path, sequence, compress) if found and not found.clips else []
@@ -169,7 +169,9 @@ def _convert_split(
     from gvpipe.playback import files
 
     def write(run: Run, path: Path) -> tuple[dict[str, int], list[str]]:
-        skin, said = find_skin(run.sequence, wanted, progress) if wanted and run.sequence.n_frames > 1 else (None, [])
+        skin, said = (
+            find_skin(run.sequence, str(path), wanted, progress) if wanted and run.sequence.n_frames > 1 else (None, [])
+        )
         notes = files.write(run.sequence, path, run.start, skin, compress)
         counts = {"joints": skin.joints if skin else 0, "correctives": len(skin.shapes) if skin else 0}
         return counts if wanted else {}, [*(f"{path.name}: {each}" for each in said), *notes]

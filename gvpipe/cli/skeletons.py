@@ -109,8 +109,8 @@ def check_glb_options(target: str, is_wanted: bool, compress: str, wanted: SkinO
         raise click.UsageError(f"--skin writes a .glb or USD file; OUTPUT is {target!r}")
 
 
-def find_skin(sequence: MeshSequence, wanted: SkinOptions, progress: Progress | None) -> Found:
-    """A skeleton for a sequence, and what to say of it; raises as `fit_skin` does."""
+def find_skin(sequence: MeshSequence, path: str, wanted: SkinOptions, progress: Progress | None) -> Found:
+    """A skeleton for a sequence to be written to a path, and what to say of it; raises as `fit_skin` does."""
     from gvpipe.rate_control.targets import parse_bound
     from gvpipe.skinning.fit import SHAPES, fit_skin
 
@@ -121,6 +121,8 @@ def find_skin(sequence: MeshSequence, wanted: SkinOptions, progress: Progress | 
     off = f"{100 * skin.error:.2g} % of the diagonal" if skin.error >= 0 else f"{errors.max:.2g} units"
     kind = "rigid " if wanted.is_rigid else ""
     said = [f"a {kind}skeleton of {_joints(skin)}{_shapes(skin)} moves it: {kg}vertices are up to {off} off"]
+    if not is_glb(path):
+        said.append("USD has scales as half floats, so that vertices may be up to 0.02 % of the diagonal farther off")
     if not is_met:
         said.append("no skeleton that was tried holds the error asked for; allow more, or give more --joints or --correctives")
     return skin, said

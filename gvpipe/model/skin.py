@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from scipy import sparse
 
 ROUNDING = 1e-5  # of the sum of weights
+SIMILAR = 1e-6  # of a square of a scale
 INFLUENCES = 4  # joints that a vertex follows, at most
 
 
@@ -103,6 +104,13 @@ class Skin:
         above = self.parents
         if above.shape != (n_joints,) or not (above.min(initial=-1) >= -1 and above.max(initial=-1) < n_joints):
             raise InputError(f"a skin's parents are of shape {above.shape}, or none of its joints; -1 stands for none")
+        linear = self.transforms[..., :3, :3]
+        square = linear @ np.swapaxes(linear, -1, -2)
+        size = np.trace(square, axis1=-2, axis2=-1)[..., None, None] / 3
+        if (np.abs(square - size * np.eye(3)) > SIMILAR * size + 1e-18).any() or (np.linalg.det(linear) < 0).any():
+            raise InputError(
+                "a skin that has parents has a joint with shear; such joints turn, go and grow alike along all axes"
+            )
         for _ in range(n_joints):
             above = np.where(above >= 0, self.parents[above], -1)
         if (above >= 0).any():

@@ -24,11 +24,12 @@ from gvpipe.model.skin import Skin
 MEMORY = 1 << 29  # bytes of what the joints leave; longer sequences are looked at in some of their frames
 DAMPING = 1e-2  # of the identity: blends that flatten a vertex take nothing back
 SMALL = 0.1  # of the root mean square that is left at last: what a shape adds to a vertex, at most, and is left out
+TINY = 1e-6  # of the longest change that a shape makes: the same
 RIDGE = 1e-9  # of a shape's energy
 
 
 def correct(skin: Skin, sequence: MeshSequence, most: int, part: float, is_enough: Callable[[Skin], bool]) -> Skin | None:
-    """The skin with the fewest corrective shapes that are enough; None if ``most`` of them are not.
+    """The skin with the fewest corrective shapes that are enough, or with ``most`` of them; None if there is nothing to mend.
 
     Args:
         skin: without shapes, of the sequence.
@@ -37,36 +38,34 @@ def correct(skin: Skin, sequence: MeshSequence, most: int, part: float, is_enoug
         part: of the root mean square error, which must not stay; where looking begins.
         is_enough: whether a skin will do.
     """
-    shapes = _principal_shapes(skin, sequence, most)
+    unit = frame_diagonal(sequence) or 1.0
+    most = min(most, max(1, math.isqrt(MEMORY // (16 * sequence.n_frames))))
+    shapes = _principal_shapes(skin, sequence, most, unit)
     if not len(shapes):
         return None
-    equations = _equations(skin, sequence, shapes)
-    tried: dict[int, Skin | None] = {}
+    equations = _equations(skin, sequence, shapes, unit)
+    tried: dict[int, tuple[Skin, bool]] = {}
 
-    def made(count: int) -> Skin | None:
+    def made(count: int) -> tuple[Skin, bool]:
         if count not in tried:
-            found = _with_shapes(skin, shapes[:count], equations.weights(count))
-            tried[count] = found if is_enough(found) else None
+            found = _with_shapes(skin, unit * shapes[:count], equations.weights(count))
+            tried[count] = found, is_enough(found)
         return tried[count]
 
     numbers = range(1, len(shapes) + 1)
-    begin = numbers[0] + bisect_left(numbers, True, key=lambda count: equations.left(count) <= part)
-    if begin > len(shapes):
-        return None
+    begin = min(numbers[0] + bisect_left(numbers, True, key=lambda count: equations.left(count) <= part), len(shapes))
     low, high = begin - 1, begin  # what is below has too large an error; `high` grows until it is enough
-    while made(high) is None:
-        if high == len(shapes):
-            return None
+    while not made(high)[1] and high < len(shapes):
         low, high = high, min(high + max(high - begin, 1), len(shapes))
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if made(middle) is not None else (middle, high)
-    return made(high)
+        low, high = (low, middle) if made(middle)[1] else (middle, high)
+    return made(high)[0]
 
 
 @dataclass(frozen=True, eq=False)
 class _Equations:
-    """What each frame's weights of K shapes should solve, in model units.
+    """What each frame's weights of K shapes should solve.
 
     Args:
         normal: ``(F, K, K)``, products of the posed shapes.
@@ -80,9 +79,10 @@ class _Equations:
 
     def weights(self, count: int) -> Float64:
         """``(F, count)``: the best weights of the first shapes."""
-        normal, given = self.normal[:, :count, :count], self.given[:, :count, None]
-        ridge = RIDGE * np.trace(normal, axis1=1, axis2=2).max(initial=1e-300) * np.eye(count)
-        return np.asarray(np.linalg.solve(normal + ridge, given)[:, :, 0])
+        normal, given = self.normal[:, :count, :count].copy(), self.given[:, :count, None]
+        at = np.arange(count)
+        normal[:, at, at] += RIDGE * np.trace(normal, axis1=1, axis2=2).max(initial=1e-300)
+        return np.asarray(np.linalg.solve(normal, given)[:, :, 0])
 
     def left(self, count: int) -> float:
         """Part of the root mean square that stays with the first shapes."""
@@ -90,15 +90,15 @@ class _Equations:
         return math.sqrt(max(1 - mended / self.energy, 0.0)) if self.energy else 0.0
 
 
-def _principal_shapes(skin: Skin, sequence: MeshSequence, most: int) -> Float32:
-    """``(K, V, 3)``, K at most ``most``, largest first; each as large as it is in the frame that has most of it."""
+def _principal_shapes(skin: Skin, sequence: MeshSequence, most: int, unit: float) -> Float32:
+    """``(K, V, 3)`` in a unit, K at most ``most``, largest first; each as large as it is in the frame that has most of it."""
     n = len(skin.bind)
     held = max(2, MEMORY // (12 * max(n, 1)))
     chosen = np.unique(np.linspace(0, sequence.n_frames - 1, min(held, sequence.n_frames)).astype(int)).tolist()
     left = np.empty((len(chosen), 3 * n), np.float32)
     damping = DAMPING * np.eye(3)
     for row, k in enumerate(chosen):
-        off = sequence.read(k, k + 1)[0].astype(np.float64) - skin.evaluate(k)
+        off = (sequence.read(k, k + 1)[0].astype(np.float64) - skin.evaluate(k)) / unit
         blends = skin.blended(k)[:, :, :3]
         turned = np.swapaxes(blends, 1, 2)
         left[row] = np.linalg.solve(turned @ blends + damping, turned @ off[:, :, None]).reshape(-1)
@@ -110,20 +110,21 @@ def _principal_shapes(skin: Skin, sequence: MeshSequence, most: int) -> Float32:
     shapes *= np.abs(vectors[:, :count]).max(axis=0)[:, None].astype(np.float32)
     remains = np.sqrt(max(float(energies[count:].sum()), 0.0) / (len(chosen) * n)) if n else 0.0
     made = shapes.reshape(count, n, 3)
-    made[np.linalg.norm(made, axis=2) < SMALL * max(remains, 1e-6 * (frame_diagonal(sequence) or 1.0))] = 0
+    length = np.linalg.norm(made, axis=2)
+    made[length < max(SMALL * remains, TINY * float(length.max(initial=0)))] = 0
     return made
 
 
-def _equations(skin: Skin, sequence: MeshSequence, shapes: Float32) -> _Equations:
+def _equations(skin: Skin, sequence: MeshSequence, shapes: Float32, unit: float) -> _Equations:
     count, energy = len(shapes), 0.0
     normal, given = np.empty((sequence.n_frames, count, count)), np.empty((sequence.n_frames, count))
     by_vertex = np.ascontiguousarray(np.moveaxis(shapes, 0, 2))  # (V, 3, K)
     for first, block in sequence.chunks():
         for k, frame in enumerate(block, first):
             posed = (skin.blended(k)[:, :, :3].astype(np.float32) @ by_vertex).reshape(-1, count)
-            off = (frame - skin.evaluate(k)).reshape(-1)
+            off = ((frame.astype(np.float64) - skin.evaluate(k)) / unit).reshape(-1)
             normal[k], given[k] = posed.T @ posed, posed.T @ off
-            energy += float(np.square(off, dtype=np.float64).sum())
+            energy += float(np.square(off).sum())
     return _Equations(normal, given, energy)
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from gvpipe.coding.registry import encode_sequence, make_codec, read_skin
 from gvpipe.foundation.arrays import Float32, Float64
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.foundation.progress import Progress, silent
-from gvpipe.metrics.vertex_errors import Errors, frame_diagonal, measure_errors
+from gvpipe.metrics.vertex_errors import Errors, frame_diagonal, measure_errors, measure_spread
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import INFLUENCES, Skin, joint_means
 from gvpipe.skinning.corrective_fit import correct
@@ -35,6 +36,8 @@ LOOSE = 1.35  # of the error, what the codec is asked for at first: fitting the 
 MORE = (64, 128, 256)  # joints that are tried where those that the codec finds do not do
 MOST = 1024  # joints
 DEFAULT_KG = 0.14  # percent: that of quality 75
+COARSEST = 20.0  # percent
+OVER_MEAN = 4.0  # times, the largest distance of a vertex is the root mean square
 SMALLEST = 1e-4  # of the diagonal: joints that are smaller count as so large
 SHAPES = 64  # corrective ones, at most, where no number is given
 JOINT_BYTES, SHAPE_BYTES = 20.0, 3.5  # of a joint and frame, and of a shape and vertex, in compressed files of samba and cloth
@@ -128,6 +131,8 @@ def fit_skin(
     for count, factor in ((joints, 1.0),) if joints else (*begun, *((count, 1.0) for count in MORE)):
         if search.look(count, factor):
             break
+    if not search.held and not joints:
+        search.look(LEAST, 1.0, again=True)
     if not (joints or rigid):
         search.look_for_fewer()
     found = search.held or search.best
@@ -145,7 +150,7 @@ class _Search:
 
     Attributes:
         held: the smallest one that holds the error.
-        best: of those whose joints alone do not hold it, the one with the least error.
+        best: of those that do not hold it, the one with the least error.
         joints: that the codec found last.
     """
 
@@ -158,12 +163,16 @@ class _Search:
     best: Fitted | None = None
     joints: int = 0
 
-    def look(self, count: int, factor: float) -> bool:
-        """Try a number of joints, 0 for any, and part of the error; returns whether more joints would be of no use."""
-        if 0 < count <= self.joints:
+    def look(self, count: int, factor: float, again: bool = False) -> bool:
+        """Try a number of joints, 0 for any, and part of the error; returns whether more joints would be of no use.
+
+        Fewer than those that were found before are tried ``again`` alone.
+        """
+        if 0 < count <= self.joints and not again:
             return False
-        kg = self.wanted.kg if self.wanted.kg is not None else DEFAULT_KG
-        codec = make_codec(CODEC, {"quality": quality_of(factor * kg), "clusters": count})
+        if self.held and JOINT_BYTES * count * self.sequence.n_frames >= self.held.size:
+            return True
+        codec = make_codec(CODEC, {"quality": quality_of(factor * self._kg), "clusters": count})
         coarse = read_skin(encode_sequence(codec, self.sequence, self.report).bitstream)
         if coarse is None:
             return True
@@ -177,12 +186,21 @@ class _Search:
             if nearest is None or found.errors.rmse < nearest.errors.rmse:
                 nearest = found
         assert nearest is not None  # there is a candidate
-        if self.best is None or nearest.errors.rmse < self.best.errors.rmse:
-            self.best = nearest
         corrected = self._corrected(nearest)
-        if corrected:
+        if corrected and corrected.is_met:
             self._hold(corrected)
-        return corrected is not None and corrected.shapes_size <= corrected.joints_size / 2
+            return corrected.shapes_size <= corrected.joints_size / 2
+        for each in (nearest, corrected):
+            if each and (self.best is None or each.errors.rmse < self.best.errors.rmse):
+                self.best = each
+        return False
+
+    @cached_property
+    def _kg(self) -> float:
+        """The error that the codec is asked for; what only the largest distance bounds has about so much."""
+        if self.wanted.kg is not None or self.wanted.largest is None:
+            return self.wanted.kg or DEFAULT_KG
+        return min(COARSEST, 100 * self.wanted.largest / (OVER_MEAN * measure_spread(self.sequence)))
 
     def look_for_fewer(self) -> None:
         """Try fewer joints, with shapes in their place, for as long as that pays."""
@@ -193,8 +211,7 @@ class _Search:
             is_even = before.shapes_size > before.joints_size / 2
             if is_even or fewer < LEAST or spared <= 2 * SHAPE_BYTES * self.sequence.n_vertices:
                 return
-            self.joints = 0
-            self.look(fewer, 1.0)
+            self.look(fewer, 1.0, again=True)
             if self.held is before:
                 return
 
@@ -210,7 +227,7 @@ class _Search:
             self.held = found
 
     def _corrected(self, found: Fitted) -> Fitted | None:
-        """A skeleton with the fewest corrective shapes that hold the error; None if the most that are allowed do not.
+        """A skeleton with the fewest corrective shapes that hold the error, or with as many as are allowed; None without any.
 
         What takes more than the skeleton that holds it already is not looked at.
         """

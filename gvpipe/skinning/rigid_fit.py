@@ -39,6 +39,7 @@ BLOCK = 1024  # vertices whose weights are fitted together
 OWN = 4.0  # times, what a vertex follows counts more than what a neighbour follows
 POINT = 1e-15  # mean squared distance from the middle, in diagonals: what has less is one point
 LEAST_SCALE = 1e-6
+SHRUNK = 0.05  # of its largest size: a joint that gets smaller has none below it
 PARTS = 4096  # of a weight: their sums are exact
 TOWARDS_MIDDLE = 1e-3  # of a pivot's energy, towards the middle of what two joints share
 
@@ -274,6 +275,9 @@ def _tie(skin: Skin, around: sparse.csr_array) -> tuple[Int32, Float64]:
         root = int(joints[sums[joints].argmax()])
         order, before = breadth_first_order(tree, root, directed=False)
         parents[order[1:]] = before[order[1:]]
+    sizes = np.cbrt(np.abs(np.linalg.det(skin.transforms[:, :, :3, :3])))
+    shrinks = sizes.min(axis=0) < SHRUNK * np.maximum(sizes.max(axis=0), 1)
+    parents[(parents >= 0) & shrinks[parents]] = -1  # nothing hangs on what nearly vanishes, which would have to undo that
     pivots = joint_means(skin, skin.bind)
     for j in np.flatnonzero(parents >= 0):
         pivots[j] = _hinge(skin, followed, int(parents[j]), int(j))

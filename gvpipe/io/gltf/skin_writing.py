@@ -40,7 +40,6 @@ STANDS = 1e-9  # of a rotation or a scale, and of the bind pose's extent for a t
 LEAST_BITS = 4  # of quaternions
 COMPARED = 16  # frames, of those that lie evenly, and of those where joints are farthest from rest
 TINY, FLAT = 1e-100, 1e-6  # FLAT: of a cube's volume
-WEIGHT_STEP = 2.0**-13  # of corrective shapes, whose weights end at 1
 ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
 
 
@@ -71,8 +70,10 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     sources = prepared.split.sources
     name = prepared.sequence.metadata.texts.get("clip") or "animation"
     clips = skin.clips or (Clip(name, 0, skin.n_frames),)
-    keys = find_keys(skin.part(clips[0].start, clips[0].stop))
-    limit = max(keys.precision, EXACT * extent_of(skin.bind))
+    near = _with_used_vertices(skin, prepared.sequence.faces)
+    extent = extent_of(near.bind)
+    keys = find_keys(near.part(clips[0].start, clips[0].stop))
+    limit = max(keys.precision, EXACT * extent)
     rounded = replace(skin, weights=(_as_fractions(skin.weights) / FULL).astype(np.float32))
     is_near = _farthest(skin, rounded) <= limit
     weights = _as_fractions(skin.weights[sources]) if is_near else skin.weights[sources]
@@ -94,7 +95,8 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
     unit = 1.0 if lattice is None else lattice.step
-    shaped = _write_shapes(glb, written, skin, sources, unit, keys.precision / max(np.sqrt(len(skin.shapes)), 1) / unit)
+    step = keys.precision / max(np.sqrt(len(skin.shapes)), 1) / _stretch(skin)
+    shaped = _write_shapes(glb, written, skin, sources, unit, step / unit)
     if skin.parents is None:
         numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
         tops = [outer for outer, _ in numbers]
@@ -105,11 +107,13 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
     glb.append("skins", {"joints": [inner for _, inner in numbers], "skeleton": root, "inverseBindMatrices": inverse})
     glb.tree["scenes"][0]["nodes"].append(root)
     rest = AffineNodes(*(each[0] for each in keys.nodes))
-    extent = extent_of(skin.bind)
+    longest = float(np.linalg.norm(skin.shapes, axis=2).max(initial=0))
     for clip in clips:
-        own = keys if clip is clips[0] else find_keys(skin.part(clip.start, clip.stop))
+        own = keys if clip is clips[0] else find_keys(near.part(clip.start, clip.stop))
         number = _write_keys(glb, prepared.sequence.fps, clip.name, own, rest, numbers, extent)
-        _write_shape_keys(glb, number, prepared.sequence.fps, skin.shape_weights[clip.start : clip.stop], shaped)
+        _write_shape_keys(
+            glb, number, prepared.sequence.fps, skin.shape_weights[clip.start : clip.stop], shaped, step / (longest or 1.0)
+        )
 
 
 def _write_shapes(
@@ -138,8 +142,10 @@ def _write_shapes(
     return shaped
 
 
-def _write_shape_keys(glb: Glb, animation: int, fps: float, weights: Float64, shaped: list[tuple[int, Int64]]) -> None:
-    """Add the weights ``(F, C)`` of corrective shapes to an animation, a key in each frame."""
+def _write_shape_keys(
+    glb: Glb, animation: int, fps: float, weights: Float64, shaped: list[tuple[int, Int64]], step: float
+) -> None:
+    """Add the weights ``(F, C)`` of corrective shapes to an animation, a key in each frame, within a step where it is packed."""
     if not shaped:
         return
     tree = glb.tree["animations"][animation]
@@ -148,10 +154,24 @@ def _write_shape_keys(glb: Glb, animation: int, fps: float, weights: Float64, sh
     for node, used in shaped:
         if used.tobytes() not in known:
             values = weights[:, used].reshape(-1, 1)
-            filtered = steps_of(values, WEIGHT_STEP) if glb.is_packed else None
+            filtered = steps_of(values, step) if glb.is_packed else None
             known[used.tobytes()] = len(tree["samplers"])
             tree["samplers"].append({"input": times, "output": glb.block(values.astype(np.float32), filtered=filtered)})
         tree["channels"].append({"sampler": known[used.tobytes()], "target": {"node": node, "path": "weights"}})
+
+
+def _stretch(skin: Skin) -> float:
+    """How much longer joints make what lies about a vertex, at most; at least 1."""
+    linear = skin.transforms[:, np.unique(skin.indices), :3, :3]
+    return max(1.0, float(np.linalg.norm(linear, axis=(2, 3)).max(initial=1)) / np.sqrt(3))
+
+
+def _with_used_vertices(skin: Skin, faces: Int32) -> Skin:
+    """A skin that has vertices of no triangle where some other one is: how exact a file is does not hang on them."""
+    used = np.unique(faces)
+    bind = np.full_like(skin.bind, skin.bind[used[0]])
+    bind[used] = skin.bind[used]
+    return replace(skin, bind=bind)
 
 
 def _farthest(skin: Skin, other: Skin) -> float:
