@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scipy import sparse
 
 ROUNDING = 1e-5  # of the sum of weights
-SIMILAR = 1e-6  # of a square of a scale
+SIMILAR = 1e-4  # of a square of a scale
 INFLUENCES = 4  # joints that a vertex follows, at most
 
 
@@ -104,6 +104,10 @@ class Skin:
         above = self.parents
         if above.shape != (n_joints,) or not (above.min(initial=-1) >= -1 and above.max(initial=-1) < n_joints):
             raise InputError(f"a skin's parents are of shape {above.shape}, or none of its joints; -1 stands for none")
+        for _ in range(n_joints):
+            above = np.where(above >= 0, self.parents[above], -1)
+        if (above >= 0).any():
+            raise InputError("a skin's parents go round in a circle; one joint must have none")
         linear = self.transforms[..., :3, :3]
         square = linear @ np.swapaxes(linear, -1, -2)
         size = np.trace(square, axis1=-2, axis2=-1)[..., None, None] / 3
@@ -111,10 +115,6 @@ class Skin:
             raise InputError(
                 "a skin that has parents has a joint with shear; such joints turn, go and grow alike along all axes"
             )
-        for _ in range(n_joints):
-            above = np.where(above >= 0, self.parents[above], -1)
-        if (above >= 0).any():
-            raise InputError("a skin's parents go round in a circle; one joint must have none")
 
     @property
     def joints(self) -> int:

@@ -13,6 +13,7 @@ Source: Khronos, glTF 2.0 specification, sections 3.7.3 (skins) and 3.11 (animat
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -145,7 +146,7 @@ def _write_shapes(
 def _write_shape_keys(
     glb: Glb, animation: int, fps: float, weights: Float64, shaped: list[tuple[int, Int64]], step: float
 ) -> None:
-    """Add the weights ``(F, C)`` of corrective shapes to an animation, a key in each frame, within a step where it is packed."""
+    """Add the weights ``(F, C)`` of corrective shapes to an animation, a key in each frame; within a step in packed files."""
     if not shaped:
         return
     tree = glb.tree["animations"][animation]
@@ -163,7 +164,8 @@ def _write_shape_keys(
 def _stretch(skin: Skin) -> float:
     """How much longer joints make what lies about a vertex, at most; at least 1."""
     linear = skin.transforms[:, np.unique(skin.indices), :3, :3]
-    return max(1.0, float(np.linalg.norm(linear, axis=(2, 3)).max(initial=1)) / np.sqrt(3))
+    longest = np.sqrt(np.square(linear).sum(axis=(2, 3)).max(initial=0))
+    return max(1.0, float(longest) / math.sqrt(3))
 
 
 def _with_used_vertices(skin: Skin, faces: Int32) -> Skin:
