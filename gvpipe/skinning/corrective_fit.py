@@ -22,7 +22,7 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
 MEMORY = 1 << 29  # bytes of what the joints leave; longer sequences are looked at in some of their frames
-DAMPING = 1e-4  # of the identity: blends that flatten a vertex take nothing back
+DAMPING = 1e-2  # of the identity: blends that flatten a vertex take nothing back
 SMALL = 0.1  # of the root mean square that is left at last: what a shape adds to a vertex, at most, and is left out
 TINY = 1e-6  # of the longest change that a shape makes: the same
 RIDGE = 1e-9  # of a shape's energy

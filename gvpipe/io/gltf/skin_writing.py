@@ -162,10 +162,10 @@ def _write_shape_keys(
 
 
 def _stretch(skin: Skin) -> float:
-    """How much longer joints make what lies about a vertex, at most; at least 1."""
-    linear = skin.transforms[:, np.unique(skin.indices), :3, :3]
-    longest = np.sqrt(np.square(linear).sum(axis=(2, 3)).max(initial=0))
-    return max(1.0, float(longest) / math.sqrt(3))
+    """How much longer joints make what shapes add to a vertex, at most, in some of the frames; at least 1."""
+    changed = np.flatnonzero(skin.shapes.any(axis=(0, 2)))
+    blends = (skin.blended(k)[changed, :, :3] for k in _some_frames(skin)) if len(changed) else ()
+    return max(1.0, *(math.sqrt(np.square(each).sum(axis=(1, 2)).max() / 3) for each in blends), 1.0)
 
 
 def _with_used_vertices(skin: Skin, faces: Int32) -> Skin:
@@ -182,12 +182,18 @@ def _farthest(skin: Skin, other: Skin) -> float:
     Weights and positions in fewer bits are near where joints are, and far where joints part.
     """
     size = extent_of(skin.bind) or 1.0
-    moved = np.abs(skin.transforms - np.eye(4))
-    moved[..., :3, 3] /= size
-    wildest = np.argsort(-moved.max(axis=(1, 2, 3)))[:COMPARED]
-    frames = np.unique([*np.linspace(0, skin.n_frames - 1, COMPARED).astype(int), *wildest])
+    frames = _some_frames(skin)
     off = ((skin.evaluate(k).astype(np.float64) - other.evaluate(k)) / size for k in frames)
     return size * max(float(np.linalg.norm(each, axis=1).max(initial=0)) for each in off)
+
+
+def _some_frames(skin: Skin) -> list[int]:
+    """Frames that lie evenly, and those where joints are farthest from rest."""
+    moved = np.abs(skin.transforms - np.eye(4))
+    moved[..., :3, 3] /= extent_of(skin.bind) or 1.0
+    wildest = np.argsort(-moved.max(axis=(1, 2, 3)))[:COMPARED]
+    found: list[int] = np.unique([*np.linspace(0, skin.n_frames - 1, COMPARED).astype(int), *wildest]).tolist()
+    return found
 
 
 def _inverse_binds(pivots: Float64, lattice: Lattice | None) -> Float32:
