@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from gvpipe.asset.part import Part
     from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.foundation.errors import GvpipeError
+    from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
     from gvpipe.metrics.comparison import Comparison, compare
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
@@ -62,6 +63,8 @@ __all__ = [
     "encode",
     "encode_all",
     "export_html",
+    "from_pyvista",
+    "from_vtk",
     "info",
     "open",
     "open_live",
@@ -81,6 +84,7 @@ _HOMES = {
     "gvpipe.asset.part": ("Part",),
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
+    "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
     "gvpipe.playback.files": ("read", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
     "gvpipe.metrics.comparison": ("Comparison", "compare"),

@@ -15,7 +15,7 @@ from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_formats import HAVE_CLIPS, IN_PROCESSES, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, scene_readers
+from gvpipe.io.scene_formats import HAVE_CLIPS, IN_PROCESSES, MARKERS, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, scene_readers
 
 if TYPE_CHECKING:
     from gvpipe.model.sequence import MeshSequence
@@ -83,7 +83,8 @@ def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], optio
     reader = READERS.get(suffix)
     # a pattern of frames may end in .glb, too
     if reader is not None and (os.path.isfile(path) or (suffix not in FRAME_FORMATS and not os.path.isdir(path))):
-        check_file(Path(path))
+        if suffix not in MARKERS or not os.path.isfile(path):
+            check_file(Path(path))
         with contextlib.nullcontext() if suffix in IN_PROCESSES else reading(Path(path), ""):
             sequence = reader(Path(path), options)
         if sequence is not None:

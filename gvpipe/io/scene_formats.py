@@ -27,7 +27,9 @@ SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".xdmf", ".xmf"), late("simulation.xdmf", "read_xdmf")),
     **dict.fromkeys((".e", ".exo", ".ex2"), late("simulation.exodus", "read_exodus")),
     **dict.fromkeys((".case", ".encas"), late("simulation.ensight", "read_ensight")),
+    **dict.fromkeys((".foam", ".cgns", ".cas", ".nek5000"), late("simulation.vtk_objects", "read_by_vtk")),
 }
+MARKERS = (".foam",)  # empty files that say what lies beside them
 OPENVAT = ".openvat"
 POINT_CACHES = (".pc2", ".mdd", ".npy")
 HAVE_CLIPS = (*GLTF, ".fbx")
