@@ -49,7 +49,7 @@ COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec 
 COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
 
 if TYPE_CHECKING:
-    from gvpipe.asset_coding.encoder import AssetCoder
+    from gvpipe.asset_coding.encoder import AssetCoder, Plan
     from gvpipe.rasterizer.camera import Camera
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
@@ -229,7 +229,7 @@ def encode(
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=[*_notes(sequence, target, asset.plan.left_out), *_refusal(path, bitstream, size)],
+        notes=[*_notes(sequence, target, asset.plan), *_refusal(path, bitstream, size)],
     )
 
 
@@ -593,12 +593,12 @@ def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progr
     return write_file(bitstream, path, coded.check, segment_parts(bitstream) if layout == STREAM else None), bitstream
 
 
-def _notes(sequence: MeshSequence, target: Target | None, left_out: Sequence[str]) -> list[str]:
+def _notes(sequence: MeshSequence, target: Target | None, plan: Plan) -> list[str]:
     """What a user should know, a line each."""
     diagonal = frame_diagonal(sequence)
     loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
     rounded = notes.rounded(sequence.rounding, diagonal)
-    return [*sequence.notes, *loose, *rounded, *notes.not_carried(sorted(left_out))]
+    return [*sequence.notes, *loose, *rounded, *notes.whole_numbers(plan.whole), *notes.not_carried(sorted(plan.left_out))]
 
 
 def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:

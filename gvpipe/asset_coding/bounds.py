@@ -5,6 +5,7 @@
 | uv | 1/4 texel of the largest image, 1/8192 without images |
 | normal, tangent | 1 degree |
 | colours, labels, integers | exact |
+| floats of which all are whole numbers below 2^24 | exact: they count or name something |
 | others | 0.1 % of their range |
 """
 
@@ -44,7 +45,9 @@ class Precision:
 NOT_KEPT = Precision(is_kept=False)
 
 
-def precision(given: float | str | None, kind: str, is_float: bool, spread: float, texels: int, what: str) -> Precision:
+def precision(
+    given: float | str | None, kind: str, is_float: bool, spread: float, texels: int, what: str, is_whole: bool = False
+) -> Precision:
     """Return the precision of one attribute or field.
 
     Args:
@@ -55,6 +58,7 @@ def precision(given: float | str | None, kind: str, is_float: bool, spread: floa
         spread: largest less smallest value.
         texels: side of the largest image, 0 without images.
         what: it is, for messages.
+        is_whole: whether all are whole numbers.
 
     Raises:
         SettingError: the text is none of these, or the bound is no number above 0.
@@ -64,7 +68,7 @@ def precision(given: float | str | None, kind: str, is_float: bool, spread: floa
     text = text.removesuffix(KEEP_NAN)
     if text == "none":
         return NOT_KEPT
-    if text == "exact" or (not text and (not is_float or kind in ("color", "label"))):
+    if text == "exact" or (not text and (not is_float or is_whole or kind in ("color", "label"))):
         return Precision(holes=holes)
     if not text:
         return Precision(bound=_default(kind, spread, texels), holes=holes)

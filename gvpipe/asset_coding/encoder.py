@@ -36,7 +36,7 @@ from gvpipe.asset_coding.directory import (
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
-from gvpipe.asset_coding.scan import scan_field
+from gvpipe.asset_coding.scan import WHOLE_KINDS, are_whole, scan_field
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
@@ -63,12 +63,14 @@ class Plan:
         attributes, fields: by name, with their precision, and for fields their range.
         images: as they go into the file.
         left_out: names of what a user asked to leave out.
+        whole: names of floats that are kept exactly, since all are whole numbers and nobody asked otherwise.
     """
 
     attributes: dict[str, tuple[Attribute, Precision]]
     fields: dict[str, tuple[Field, Precision, tuple[float, float]]]
     images: tuple[Image, ...]
     left_out: tuple[str, ...]
+    whole: tuple[str, ...] = ()
 
 
 def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Plan:
@@ -82,13 +84,15 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     check_names(options.fields, sequence.fields, "field")
     images = tuple(limit_image(image, options.textures) for image in sequence.images)
     texels = max((max(image_size(image.data) or (0,)) for image in images), default=0)
-    attributes, fields, left_out = {}, {}, []
+    attributes, fields, left_out, whole = {}, {}, [], []
     for name, attribute in sequence.attributes.items():
         values = attribute.values
         spread = float(values.max() - values.min()) if values.size else 0.0
-        found = precision(
-            options.attributes.get(name), attribute.kind, values.dtype.kind == "f", spread, texels, f"attribute {name!r}"
-        )
+        is_float = values.dtype.kind == "f"
+        is_whole = is_float and spread > 0 and attribute.kind in WHOLE_KINDS and are_whole(values)
+        given = options.attributes.get(name)
+        found = precision(given, attribute.kind, is_float, spread, texels, f"attribute {name!r}", is_whole)
+        whole += [name] if is_whole and given is None else []
         if found.is_kept:
             attributes[name] = attribute, found
         else:
@@ -100,10 +104,12 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
         if not holes.is_kept:
             left_out.append(name)
             continue
-        low, high = scan_field(name, field, holes.holes, sequence.name)
-        found = precision(given, field.kind, is_float, high - low, texels, f"field {name!r}")
-        fields[name] = field, found, (low, high)
-    return Plan(attributes, fields, images, tuple(left_out))
+        scan = scan_field(name, field, holes.holes, sequence.name)
+        is_whole = scan.is_whole and scan.high > scan.low
+        found = precision(given, field.kind, is_float, scan.high - scan.low, texels, f"field {name!r}", is_whole)
+        whole += [name] if is_whole and found.bound == 0 and given is None else []
+        fields[name] = field, found, (scan.low, scan.high)
+    return Plan(attributes, fields, images, tuple(left_out), tuple(whole))
 
 
 class AssetCoder:

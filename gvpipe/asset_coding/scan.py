@@ -1,8 +1,9 @@
-"""One pass over a field's values: their range, and that they are numbers."""
+"""One pass over a field's values: their range, that they are numbers, and whether all are whole ones."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,10 +12,26 @@ from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.errors import InputError
 
 CHUNK_BYTES = 16 << 20
+LARGEST_WHOLE = 2.0**24  # float32 has all whole numbers up to there
+WHOLE_KINDS = ("scalar", "vector")  # kinds whose whole numbers stay whole
 
 
-def scan_field(name: str, given: Field, holes: bool, where: str) -> tuple[float, float]:
-    """Return the smallest and largest value, NaN left out.
+class Scan(NamedTuple):
+    """The smallest and largest value, and whether all are whole numbers; NaN left out."""
+
+    low: float
+    high: float
+    is_whole: bool
+
+
+def are_whole(values: Array) -> bool:
+    """Whether all floats are whole numbers that float32 has; NaN left out."""
+    with np.errstate(invalid="ignore"):
+        return bool(((np.rint(values) == values) & (np.abs(values) <= LARGEST_WHOLE) | np.isnan(values)).all())
+
+
+def scan_field(name: str, given: Field, holes: bool, where: str) -> Scan:
+    """Look at all values.
 
     Args:
         name: of the field.
@@ -25,7 +42,7 @@ def scan_field(name: str, given: Field, holes: bool, where: str) -> tuple[float,
     Raises:
         InputError: a value is infinite, or NaN though there may be no holes; the message names frame and row.
     """
-    low, high = np.inf, -np.inf
+    low, high, is_whole = np.inf, -np.inf, given.dtype.kind == "f" and given.kind in WHOLE_KINDS
     for first, block in chunks(given):
         if block.dtype.kind == "f":
             bad = np.isinf(block) if holes else ~np.isfinite(block)
@@ -37,9 +54,10 @@ def scan_field(name: str, given: Field, holes: bool, where: str) -> tuple[float,
                     f"{block[frame, row].tolist()}; {remedy}"
                 )
         with np.errstate(invalid="ignore"):
+            is_whole = is_whole and are_whole(block)
             low = min(low, float(np.fmin.reduce(block, axis=None)))
             high = max(high, float(np.fmax.reduce(block, axis=None)))
-    return (low, high) if low <= high else (0.0, 0.0)
+    return Scan(low, high, is_whole) if low <= high else Scan(0.0, 0.0, False)
 
 
 def chunks(given: Field) -> Iterator[tuple[int, Array]]:

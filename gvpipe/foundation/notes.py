@@ -54,6 +54,13 @@ def not_held(format_name: str, names: Sequence[str]) -> tuple[str, ...]:
     return (f"{format_name} has no place for {', '.join(names)}; left out (.npz holds everything)",) if names else ()
 
 
+def whole_numbers(names: Sequence[str]) -> tuple[str, ...]:
+    """The note for floats that are kept exactly, since all of them are whole numbers."""
+    listed = ", ".join(map(repr, names))
+    each = f"--field or --attribute {names[0]}=0.1%" if names else ""
+    return (f"whole numbers alone, so kept exactly: {listed} ({each} keeps them coarser)",) if names else ()
+
+
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:
     """The note for attributes that the file has no place for."""
     return (f"the file does not carry {', '.join(names)}",) if names else ()
