@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.foundation.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report, Restreamed, decode, encode, open, render, restream, skin
+    from gvpipe.api import Report, Restreamed, compare, decode, encode, open, render, restream, skin
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.foundation.errors import GvpipeError
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
-    from gvpipe.metrics.comparison import Comparison, compare
+    from gvpipe.metrics.comparison import Comparison
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
     from gvpipe.playback.files import read, write
@@ -76,7 +76,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Report", "Restreamed", "decode", "encode", "open", "render", "restream", "skin"),
+    "gvpipe.api": ("Report", "Restreamed", "compare", "decode", "encode", "open", "render", "restream", "skin"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
@@ -87,7 +87,7 @@ _HOMES = {
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
     "gvpipe.playback.files": ("read", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
-    "gvpipe.metrics.comparison": ("Comparison", "compare"),
+    "gvpipe.metrics.comparison": ("Comparison",),
     "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),
     "gvpipe.rasterizer.renderer": ("Renderer",),

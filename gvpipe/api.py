@@ -50,6 +50,7 @@ COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 c
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder, Plan
+    from gvpipe.metrics.comparison import Comparison
     from gvpipe.rasterizer.camera import Camera
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
@@ -294,6 +295,40 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
 def open(path: StrPath, *, unlimited: bool = False) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
     return Player(path, unlimited=unlimited)
+
+
+def compare(
+    reference: MeshSequence | Source, distorted: MeshSequence | Source, progress: Callable[[int, int], None] | None = None
+) -> Comparison:
+    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+
+    Args:
+        reference: the original, or what `read` takes; lengths are divided by its size.
+        distorted: as many frames and vertices, the same triangles in any order; or what `read` takes, such as a geometry video.
+        progress: called with (frames done, frames in all) after each block.
+
+    Raises:
+        InputError: one cannot be read, or the two differ in their number of frames or vertices or in their triangles, so that
+            vertices do not correspond.
+        TypeError: one of them is neither a sequence nor a path.
+
+    Examples:
+        >>> import numpy as np
+        >>> corners = np.array([[[0, 0, 0], [3, 0, 0], [0, 4, 0]]], float)  # one frame; its diagonal is 5
+        >>> still = MeshSequence(corners, [[0, 1, 2]])
+        >>> raised = MeshSequence(corners + [0, 0, 0.5], [[0, 1, 2]])
+        >>> errors = compare(still, raised)
+        >>> errors.rmse, errors.rmse_diag
+        (0.5, 0.1)
+    """
+    from gvpipe.metrics.comparison import compare as measure
+
+    both = []
+    for role, given in (("reference", reference), ("distorted", distorted)):
+        if not isinstance(given, MeshSequence | str | os.PathLike | list | tuple):
+            raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence or a path is needed")
+        both.append(given if isinstance(given, MeshSequence) else read(given))
+    return measure(both[0], both[1], progress)
 
 
 def skin(

@@ -57,8 +57,8 @@ def not_held(format_name: str, names: Sequence[str]) -> tuple[str, ...]:
 def whole_numbers(names: Sequence[str]) -> tuple[str, ...]:
     """The note for floats that are kept exactly, since all of them are whole numbers."""
     listed = ", ".join(map(repr, names))
-    each = f"--field or --attribute {names[0]}=0.1%" if names else ""
-    return (f"whole numbers alone, so kept exactly: {listed} ({each} keeps them coarser)",) if names else ()
+    each = f"a bound, such as {names[0]}=0.1%, keeps them coarser" if names else ""
+    return (f"whole numbers alone, so kept exactly: {listed} ({each})",) if names else ()
 
 
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:

@@ -208,7 +208,7 @@ class _Search:
             before = self.held
             fewer = before.skin.joints // FEWER
             spared = JOINT_BYTES * (before.skin.joints - fewer) * self.sequence.n_frames
-            is_even = before.shapes_size > before.joints_size / 2
+            is_even = before.shapes_size > before.joints_size
             if is_even or fewer < LEAST or spared <= 2 * SHAPE_BYTES * self.sequence.n_vertices:
                 return
             self.look(fewer, 1.0, again=True)

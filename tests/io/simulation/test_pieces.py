@@ -148,3 +148,25 @@ def test_warp(tmp_path: Path, run: Any) -> None:
             gvpipe.read(tmp_path / "in.npz", warp=text)
     assert run("convert", tmp_path / "in.npz", tmp_path / "c.npz", "--warp", "Displacement").status == 0
     assert np.allclose(gvpipe.read(tmp_path / "c.npz")[:], waves[:], atol=1e-6)
+
+
+def test_whole_numbers_come_back_exactly(tmp_path: Path, run: Any) -> None:
+    """Floats that count or name something stay what they are, but where a bound is asked for."""
+    waves = waving(4, 5)
+    ids = np.repeat(np.arange(16, dtype=np.float32) * 1000, 1)
+    steps = np.arange(5, dtype=np.float32)[:, None] * np.ones(16, np.float32)
+    given = replace(
+        waves,
+        attributes={"rank": ids, "heat": ids + np.float32(0.25)},
+        fields={"load": Field(steps), "stress": Field(steps / 3), "kept": Field(steps * 7)},
+    )
+    gvpipe.write(given, tmp_path / "in.npz")
+    ended = run("encode", tmp_path / "in.npz", tmp_path / "a.mp4", "--field", "kept=50%", "--json")
+    (note,) = (each for each in json.loads(ended.out)["notes"] if "whole numbers" in each)
+    assert "'rank', 'load' (" in note and "stress" not in note
+    with gvpipe.open(tmp_path / "a.mp4") as video:
+        assert np.array_equal(np.asarray(video.attributes["rank"]).ravel(), ids)
+        assert not np.array_equal(np.asarray(video.attributes["heat"]).ravel(), ids + np.float32(0.25))
+        assert np.array_equal(video.fields["load"][:], steps)
+    errors = gvpipe.compare(tmp_path / "in.npz", tmp_path / "a.mp4")
+    assert errors.fields["load"]["max"] == 0 and errors.fields["stress"]["max"] and "np." not in repr(errors)
