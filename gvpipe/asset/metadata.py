@@ -10,6 +10,7 @@ from gvpipe.asset.attribute import check_word
 from gvpipe.foundation.errors import InputError
 
 UP_AXES = ("", "x", "y", "z")
+TIMES = "times"  # name of a text: the times of all frames, seconds, where they do not follow from start and rate
 NOT_CARRIED = "not carried"  # name of a text: what the source had beside what its file carries
 SEPARATOR = "; "
 
@@ -41,6 +42,19 @@ class Metadata:
             raise InputError(f"metadata: the start time is {self.start_time}; seconds are needed")
         if not all(isinstance(key, str) and isinstance(text, str) for key, text in self.texts.items()):
             raise InputError("metadata: texts are not all texts by name; make texts of them")
+
+    def of_frames(self, start: int, stop: int, n_frames: int) -> Metadata:
+        """The metadata of frames ``start`` to ``stop`` of ``n_frames``: with their times, where each has one of its own."""
+        words = self.texts.get(TIMES, "").split()[: n_frames + 1]
+        if len(words) != n_frames or (start, stop) == (0, n_frames) or not 0 <= start < stop <= n_frames:
+            return self
+        try:
+            first = float(words[start])
+        except ValueError:  # a text of that name, of something else
+            return self
+        if not math.isfinite(first):
+            return self
+        return replace(self, start_time=first, texts={**self.texts, TIMES: " ".join(words[start:stop])})
 
 
 NO_METADATA = Metadata()

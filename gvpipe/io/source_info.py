@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.asset.listing import Things, count_polygons, list_things
+from gvpipe.asset.metadata import TIMES
 from gvpipe.foundation.arguments import StrPath
 from gvpipe.io import read
 from gvpipe.io.clips import list_clips
@@ -98,7 +99,7 @@ def source_info(
 
 def _time_range(sequence: MeshSequence) -> list[float]:
     """Seconds of the first and the last frame, by the file's own times where its steps are uneven."""
-    start, listed = sequence.metadata.start_time, sequence.metadata.texts.get("times", "").split()
+    start, listed = sequence.metadata.start_time, sequence.metadata.texts.get(TIMES, "").split()
     with contextlib.suppress(ValueError):  # a text of that name may hold anything
         times = [float(time) for time in listed]
         if len(times) == sequence.n_frames and np.isfinite(times).all():

@@ -275,7 +275,8 @@ class MeshSequence:
         size = stop - start, self.n_vertices
         exact = None if self._exact is None else Span(self.read_absolute, start, *size)
         fields = {name: each.part(start, stop) for name, each in self.fields.items()}
-        return self._derived(Span(self.read, start, *size), exact, fields=fields)
+        metadata = self.metadata.of_frames(start, stop, self.n_frames)
+        return self._derived(Span(self.read, start, *size), exact, fields=fields, metadata=metadata)
 
     def local(self) -> MeshSequence:
         """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""

@@ -12,6 +12,7 @@ from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.model.sequence import MeshSequence
 
 USUAL = ("displacement", "displacements", "disp", "displ", "u", "depl")  # names of what moves a mesh, in lower case
+TURNING = ("normal", "tangent")  # kinds of numbers that a moved mesh has others of
 STILL = 1e-9  # of the largest coordinate
 
 
@@ -34,11 +35,14 @@ def parse_warp(text: str) -> tuple[str, float]:
 
     Raises:
         SettingError: there is no name, or the scale is no finite number.
+        TypeError: it is no text.
 
     Examples:
         >>> parse_warp("displacement:2.5"), parse_warp("U"), parse_warp("a:b")
         (('displacement', 2.5), ('U', 1.0), ('a:b', 1.0))
     """
+    if not isinstance(text, str):
+        raise TypeError(f"warp is {show(text)}; a text such as 'displacement:10' is needed")
     name, colon, last = text.rpartition(":")
     try:
         found = (name, float(last)) if colon else (text, 1.0)
@@ -61,12 +65,24 @@ def warped(sequence: MeshSequence, text: str) -> MeshSequence:
         SettingError: `text` is of another form.
     """
     name, scale = parse_warp(text)
+    name, scale = (text, 1.0) if text in movers(sequence) else (name, scale)
     if name not in movers(sequence):
         known = ", ".join(map(repr, movers(sequence))) or "none"
         raise InputError(f"{sequence.name} has no vectors {name!r} on its vertices to warp by; it has {known}")
-    frames = Warped(sequence, name, scale)
-    notes = tuple(note for note in sequence.notes if not note.startswith(HINT))
-    return replace(sequence, positions=frames, notes=(*notes, f"positions are moved by {scale:g} times {name!r}"))
+    notes = [
+        *(note for note in sequence.notes if not note.startswith(HINT)),
+        f"positions are moved by {scale:g} times {name!r}",
+    ]
+    directions = [each for each, one in (*sequence.attributes.items(), *sequence.fields.items()) if one.kind in TURNING]
+    if directions:
+        notes.append(f"{', '.join(map(repr, dict.fromkeys(directions)))} of the mesh before it was moved are left out")
+    return replace(
+        sequence,
+        positions=Warped(sequence, name, scale),
+        attributes={each: one for each, one in sequence.attributes.items() if each not in directions},
+        fields={each: one for each, one in sequence.fields.items() if each not in directions},
+        notes=tuple(notes),
+    )
 
 
 HINT = "the mesh stands still; "

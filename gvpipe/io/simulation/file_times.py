@@ -81,7 +81,7 @@ def _legacy_time(path: Path) -> float | None:
     if found is None:
         return None
     rest = head[found.end() :]
-    if b"\nBINARY" in head[:1024].upper():
+    if head.split(b"\n", 3)[2].strip().upper() == b"BINARY":
         form = ">f" if found.group(1).lower() == b"float" else ">d"
         return float(struct.unpack_from(form, rest)[0])
     words = rest.split(None, 1)

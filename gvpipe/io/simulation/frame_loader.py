@@ -14,7 +14,7 @@ from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.legacy import load_legacy
 from gvpipe.io.simulation.meshio_files import MeshioLoader
-from gvpipe.io.simulation.pieces import without_duplicates
+from gvpipe.io.simulation.pieces import Welding, without_duplicates
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.xml_grids import load_xml_grid
 
@@ -29,10 +29,11 @@ class SurfaceLoader:
     def __init__(self, load: Callable[[Path], Dataset]) -> None:
         self._load = load
         self._first: tuple[Cells, int, Surface] | None = None
+        self._welding = Welding()
 
     def __call__(self, path: Path) -> Mesh:
         """Load a file; raises `ValueError`."""
-        step = without_duplicates(self._load(path))
+        step = without_duplicates(self._load(path), self._welding)
         cells, points = step.cells(), step.points()
         if self._first is not None and self._first[1] == len(points) and self._first[0].equals(cells):
             surface = self._first[2]

@@ -23,16 +23,39 @@ GHOSTS = "vtkGhostType"
 HIDING_CELLS = 1 | 8 | 32  # duplicate, refined, hidden
 HIDING_POINTS = 2  # hidden
 IDS = ("GlobalNodeIds", "GlobalNodeId")
-SAME = 1e-6  # of the largest extent: points of one number that are farther apart stay two
+SAME = 1e-5  # of the largest extent: points of one number that are farther apart at first stay two
 
 
-def without_duplicates(step: Dataset) -> Dataset:
+class Welding:
+    """Which points of a sequence's steps are one; those of the first step hold for all that have the same numbers."""
+
+    def __init__(self) -> None:
+        self.ids: Array | None = None
+        self.is_own = np.zeros(0, bool)
+        self.representative = np.zeros(0, np.int64)
+
+    def find(self, ids: Array, points: Floats) -> None:
+        """Look at a step's numbers ``(N,)`` and points ``(N, 3)``, unless the same numbers were there before."""
+        if self.ids is not None and np.array_equal(self.ids, ids):
+            return
+        _, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
+        self.ids, self.representative = ids, first[inverse.reshape(-1)]
+        apart = np.abs(points - points[self.representative]).max(axis=1, initial=0)
+        is_far = apart > SAME * float(np.ptp(points, axis=0).max(initial=0))
+        self.is_own = (self.representative == np.arange(len(points))) | is_far
+
+
+def without_duplicates(step: Dataset, welding: Welding) -> Dataset:
     """A step without ghost cells, and with one point for each number; the step itself where it has neither.
+
+    Args:
+        step: of a sequence.
+        welding: of that sequence.
 
     Raises:
         ValueError: an array has another number of rows than there are cells or points.
     """
-    return _welded(_without_ghosts(step))
+    return _welded(_without_ghosts(step), welding)
 
 
 def _without_ghosts(step: Dataset) -> Dataset:
@@ -59,23 +82,21 @@ def _without_ghosts(step: Dataset) -> Dataset:
     return replace(shown, cells=lambda: some, cell_data=_rows(shown.cell_data, rows), blocks=blocks, notes=(*shown.notes, said))
 
 
-def _welded(step: Dataset) -> Dataset:
+def _welded(step: Dataset, welding: Welding) -> Dataset:
     named = next((name for name in IDS if name in step.point_data), None)
     if named is None:
         return step
     ids = np.asarray(step.point_data[named].read()).reshape(-1)
-    _, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
-    if len(first) == len(ids):
-        return step
-    points, cells = step.points(), step.cells()
+    points = step.points()
     if len(points) != len(ids):
         raise ValueError(f"{named!r} has {len(ids)} rows, and there are {len(points)} points")
-    representative = first[inverse.reshape(-1)]
-    apart = np.abs(points - points[representative]).max(axis=1, initial=0)
-    is_own = (representative == np.arange(len(points))) | (apart > SAME * float(np.ptp(points, axis=0).max(initial=0)))
+    welding.find(ids, points)
+    is_own, cells = welding.is_own, step.cells()
+    if is_own.all():
+        return step
     rows = np.flatnonzero(is_own)
     number = np.cumsum(is_own) - 1
-    target = number[np.where(is_own, np.arange(len(points)), representative)]
+    target = number[np.where(is_own, np.arange(len(points)), welding.representative)]
     if cells.nodes.min(initial=0) < 0 or cells.nodes.max(initial=-1) >= len(points):
         return step  # whoever makes the surface says which cell that is
     joined = Cells(cells.types, cells.offsets, target[cells.nodes])

@@ -7,6 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from gvpipe.asset.metadata import TIMES
 from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.atomic import atomic_files
 from gvpipe.foundation.errors import OutputError
@@ -42,7 +43,7 @@ def frame_times(sequence: MeshSequence) -> Float64:
     """``(F,)`` seconds of the frames: those that the metadata's text has where the steps were uneven, else by the rate."""
     even = sequence.metadata.start_time + np.arange(sequence.n_frames) / sequence.fps
     try:
-        kept = np.array(sequence.metadata.texts.get("times", "").split(), np.float64)
+        kept = np.array(sequence.metadata.texts.get(TIMES, "").split(), np.float64)
     except ValueError:
         return np.asarray(even)
     return kept if len(kept) == sequence.n_frames and np.isfinite(kept).all() else np.asarray(even)

@@ -21,7 +21,7 @@ from gvpipe.io.damage import reading
 from gvpipe.io.mesh import FrameValues, too_wide
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
-from gvpipe.io.simulation.pieces import without_duplicates
+from gvpipe.io.simulation.pieces import Welding, without_duplicates
 from gvpipe.io.simulation.surface import Surface, extract_surface
 from gvpipe.io.simulation.times import empty_note, time_steps
 from gvpipe.model.origin import choose_origin, narrow, rounding
@@ -65,7 +65,8 @@ class StepFrames:
         self._steps, self.start, self._path = steps, first, path
         self._n_frames = stop - first
         self._lock = ForkLock()  # HDF5 and netCDF files are read by one thread at a time
-        self.first = self.guarded(0, lambda: without_duplicates(steps.open(first)))
+        self._welding = Welding()
+        self.first = self.guarded(0, lambda: without_duplicates(steps.open(first), self._welding))
         self._cells = self.guarded(0, self.first.cells)
         self._n_points = -1
         points = self.guarded(0, self.first.points)
@@ -102,7 +103,7 @@ class StepFrames:
 
     def open(self, frame: int) -> Dataset:
         """The step of a frame; raises `InputError` if its cells are not those of the first."""
-        step = self.guarded(frame, lambda: without_duplicates(self._steps.open(self.start + frame)))
+        step = self.guarded(frame, lambda: without_duplicates(self._steps.open(self.start + frame), self._welding))
         cells = self.guarded(frame, step.cells)
         if not cells.equals(self._cells):
             raise self._changed(frame, f"{len(cells.types)} cells, {len(self._cells.types)} at first, or other corners")

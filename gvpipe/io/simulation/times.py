@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gvpipe.asset.metadata import TIMES
 from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS
 
@@ -42,14 +43,20 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None, real_tim
         fps: frames per second instead of the file's.
         real_time: whether the rate is that of the steps, however fast or slow.
     """
-    if times is None or not np.isfinite(times).all():
+    if times is None:
         return Timing(fps or DEFAULT_FPS, 0.0, {}, () if fps or n_frames < 2 else (ASSUMED_FPS,))
+    if not np.isfinite(times).all():
+        bad = int(np.flatnonzero(~np.isfinite(times))[0])
+        rate = fps or DEFAULT_FPS
+        return Timing(
+            rate, 0.0, {}, (f"the time of frame {bad} is {times[bad]}; all are left out, {rate:g} a second are shown",)
+        )
     start = float(times[0])
     if n_frames < 2:
         return Timing(fps or DEFAULT_FPS, start, {}, ())
     steps = np.diff(times)
     mean = float(times[-1] - start) / (n_frames - 1)
-    texts = {"times": " ".join(repr(time).removesuffix(".0") for time in times.tolist())}
+    texts = {TIMES: " ".join(repr(time).removesuffix(".0") for time in times.tolist())}
     if not (steps > 0).all() or not SLOWEST <= 1 / mean <= FASTEST:
         why = "do not rise" if not (steps > 0).all() else f"are {mean:.3g} s apart"
         rate = fps or (WATCHED if (steps > 0).all() and not real_time else DEFAULT_FPS)

@@ -93,7 +93,7 @@ class XdmfSteps:
         if not self._steps:
             raise ValueError("it has no grid; a mesh is needed")
         self.n_steps = len(self._steps)
-        within = {id(each) for grid in taken for each in grid.iter("Grid")}
+        within = {id(own) for grid in taken for each in grid.iter("Grid") for own in (each, self._references.target(each))}
         others = [grid for grid in root.iter("Grid") if id(grid) not in within and grid.findall("Attribute")]
         self._left = [
             f"numbers {each.get('Name') or 'unnamed'!r} of another grid"
@@ -106,20 +106,48 @@ class XdmfSteps:
             if not temporal and grid not in taken
         ]
         self._known: dict[str, Cells] = {}
+        self._n_visited = 0  # grids of the step that is being opened
 
     def open(self, step: int) -> Dataset:
         """A step; its numbers are read when they are called for."""
+        self._n_visited = 0
         columns = [list(self._blocks(grid, 0)) for grid in self._steps[step]]
-        columns = [each for each in columns if len(each) == len(columns[0])]
-        if len(columns[0]) > MOST_BLOCKS:
-            raise ValueError(f"a step has {len(columns[0])} blocks; at most {MOST_BLOCKS} are read")
-        if len(columns[0]) == 1 and _is_uniform(self._steps[step][0]):
-            return self._open([grids[0][1] for grids in columns])
-        named = [(column[0][0], self._open([grid for _, grid in column])) for column in zip(*columns, strict=True)]
-        return join_blocks(named)
+        blocks = [(name, [grid]) for name, grid in columns[0]]
+        for column in columns[1:]:
+            for number, (name, grid) in enumerate(column):
+                own = self._home_of(blocks, name, grid, number if len(column) == len(columns[0]) else -1)
+                if own is None:
+                    blocks.append((name, [grid]))
+                else:
+                    own.append(grid)
+        if len(blocks) == 1 and _is_uniform(self._references.target(self._steps[step][0])):
+            return self._open(blocks[0][1])
+        return join_blocks([(name, self._open(grids)) for name, grids in blocks])
+
+    def _home_of(
+        self, blocks: list[tuple[str, list[ElementTree.Element]]], name: str, grid: ElementTree.Element, number: int
+    ) -> list[ElementTree.Element] | None:
+        """The grids of a block that have the mesh of another grid: that of its name, else of its number, else none."""
+        named = [grids for own, grids in blocks if own == name and name]
+        found = named[0] if len(named) == 1 else blocks[number][1] if number >= 0 else None
+        return found if found is not None and self._is_same_mesh(found[0], grid) else None
+
+    def _is_same_mesh(self, one: ElementTree.Element, two: ElementTree.Element) -> bool:
+        """Whether two grids have equal cells and points."""
+        parts = [[self._part(grid, tag) for tag in ("Topology", "Geometry")] for grid in (one, two)]
+        texts = [tuple(ElementTree.tostring(part, "unicode") for part in each) for each in parts]
+        if texts[0] == texts[1]:
+            return True
+        (topology, geometry), (other_topology, other_geometry) = parts
+        return self._cells(topology).equals(self._cells(other_topology)) and np.array_equal(
+            self._points(geometry), self._points(other_geometry)
+        )
 
     def _blocks(self, grid: ElementTree.Element, depth: int) -> Iterator[tuple[str, ElementTree.Element]]:
         """Names and grids of a step: itself, or those that its spatial collection has."""
+        self._n_visited += 1
+        if self._n_visited > MOST_BLOCKS:
+            raise ValueError(f"a step has more than {MOST_BLOCKS} grids")
         grid = self._references.target(grid)
         if _is_uniform(grid):
             yield grid.get("Name", ""), grid
@@ -136,8 +164,11 @@ class XdmfSteps:
         point_data: dict[str, DataArray] = {}
         cell_data: dict[str, DataArray] = {}
         left = []
-        for attribute in (each for grid in grids for each in grid.findall("Attribute")):
+        for attribute in (self._references.target(each) for grid in grids for each in grid.findall("Attribute")):
             name, center = attribute.get("Name") or "unnamed", (attribute.get("Center") or "Node").lower()
+            if name in point_data or name in cell_data:
+                left.append(name)
+                continue
             if attribute.get("ItemType") == "FiniteElementFunction":
                 n_dofs = int(attribute.get("ElementDegree") or 1)
                 is_flat = n_dofs == 0
@@ -147,14 +178,20 @@ class XdmfSteps:
                 (point_data if center == "node" else cell_data)[name] = DataArray(partial(self._numbers, attribute))
             else:
                 left.append(name)
-        lost = (*(f"numbers {name!r} of neither nodes nor cells" for name in left), *_others(grids), *dict.fromkeys(self._left))
+        lost = (
+            *(f"numbers {name!r} of neither nodes nor cells, or of a name that others have" for name in left),
+            *_others(grids),
+            *dict.fromkeys(self._left),
+        )
         return Dataset(partial(self._points, geometry), lambda: cells, point_data, cell_data, not_carried=lost)
 
     def _part(self, grid: ElementTree.Element, tag: str) -> ElementTree.Element:
         """A grid's topology or geometry, its own or that of the grid it refers to."""
         found = self._references.child(grid, tag)
         if found is None:
-            raise ValueError(f"grid {grid.get('Name', '')[:40]!r} has no {tag}")
+            pointers = self._references.pointers(grid)
+            leading = f", and {pointers[0][:60]!r} leads to none" if pointers else ""
+            raise ValueError(f"grid {grid.get('Name', '')[:40]!r} has no {tag}{leading}")
         return found
 
     def _cells(self, topology: ElementTree.Element) -> Cells:
@@ -227,7 +264,7 @@ class XdmfSteps:
             if own.get("TimeType", "").lower() == "hyperslab" and len(values) == 3:
                 values = values[0] + values[1] * np.arange(len(grids))
             return values if len(values) == len(grids) else None
-        found = [grid.find("Time") for grid in grids]
+        found = [next(self._references.target(grid).iter("Time"), None) for grid in grids]
         if any(time is None or time.get("Value") is None for time in found):
             return None
         return np.array([float(time.get("Value", "0")) for time in found if time is not None])

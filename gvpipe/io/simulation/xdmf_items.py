@@ -19,7 +19,8 @@ from gvpipe.io.simulation.xdmf_functions import evaluate
 from gvpipe.io.simulation.xdmf_references import References
 
 KINDS = {"FLOAT": "f", "INT": "i", "UINT": "u", "CHAR": "i", "UCHAR": "u"}
-MOST_DEPTH = 20  # of items in items
+MOST_DEPTH = 3  # of items in items
+MOST_READ = 200  # items for one array
 SIZES = {"CHAR": 1, "UCHAR": 1}
 
 
@@ -29,6 +30,7 @@ class Items:
     def __init__(self, path: Path, references: References) -> None:
         self._path, self._size, self._references = path, path.stat().st_size, references
         self._open: dict[Path, HdfFile] = {}
+        self._n_read = 0  # for the array that is being read
 
     def read(self, item: ElementTree.Element, depth: int = 0) -> Array:
         """The numbers of a DataItem, in its dimensions.
@@ -42,8 +44,9 @@ class Items:
         """
         item = self._references.target(item)
         kind = item.get("ItemType", "Uniform").lower()
-        if depth > MOST_DEPTH:
-            raise ValueError(f"its DataItems are nested more than {MOST_DEPTH} deep")
+        self._n_read = self._n_read + 1 if depth else 0
+        if depth > MOST_DEPTH or self._n_read > MOST_READ:
+            raise ValueError(f"its DataItems are nested more than {MOST_DEPTH} deep, or name more than {MOST_READ} others")
         if kind == "hyperslab":
             return self._slab(item, depth)
         if kind == "function":

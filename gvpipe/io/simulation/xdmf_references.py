@@ -13,7 +13,7 @@ XINCLUDE = re.compile(r"\{[^}]*XInclude\}include$")  # of 2001 as in the standar
 POINTER = re.compile(r"^\s*xpointer\((.*)\)\s*$", re.DOTALL)
 CHOICE = re.compile(r"/\*(\[[^\[\]]*self::[^\[\]]*\])?$")  # some of the children
 STEP = r"""(?:\w+|\*)(?:\[(?:@\w+=(?:"[^"\[\]]*"|'[^'\[\]]*')|\d+)\])*"""
-PATH = re.compile(rf"//?{STEP}(?://?{STEP})*")  # the part of XPath that is read
+PATH = re.compile(rf"//?{STEP}(?:/{STEP})*")  # the part of XPath that is read
 LONGEST = 1000  # characters of a path
 MOST = 20  # references from one to the next
 
@@ -44,6 +44,10 @@ class References:
             if named is not None and (found := named if named.tag == tag else named.find(tag)) is not None:
                 return self.target(found)
         return None
+
+    def pointers(self, parent: ElementTree.Element) -> list[str]:
+        """What an element includes."""
+        return [each.get("xpointer", "") for each in parent if XINCLUDE.search(each.tag)]
 
     def target(self, element: ElementTree.Element) -> ElementTree.Element:
         """The element itself, or the one that it refers to.

@@ -12,6 +12,7 @@ import pytest
 from sequences import waving
 
 import gvpipe
+import gvpipe.model.warp
 from gvpipe.asset.field import Field
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.io.simulation.times import time_steps
@@ -148,6 +149,45 @@ def test_warp(tmp_path: Path, run: Any) -> None:
             gvpipe.read(tmp_path / "in.npz", warp=text)
     assert run("convert", tmp_path / "in.npz", tmp_path / "c.npz", "--warp", "Displacement").status == 0
     assert np.allclose(gvpipe.read(tmp_path / "c.npz")[:], waves[:], atol=1e-6)
+
+
+def test_points_that_part_later_stay_one(tmp_path: Path) -> None:
+    """What is one point in the first step is one in all, so that rounding changes no topology."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for step, shift in enumerate((1.0, 1.00004)):
+        piece(folder / f"a{step}.vtu", 0, list(range(8)))
+        piece(folder / f"b{step}.vtu", shift, [1, 8, 3, 9, 5, 10, 7, 11])
+    rows = "".join(
+        f'<DataSet timestep="{step}" part="{k}" file="in/{name}{step}.vtu"/>' for step in (0, 1) for k, name in enumerate("ab")
+    )
+    (tmp_path / "a.pvd").write_text(f'<VTKFile type="Collection"><Collection>{rows}</Collection></VTKFile>')
+    assert gvpipe.read(tmp_path / "a.pvd")[:].shape == (2, 12, 3)
+
+
+def test_times_follow_the_frames(tmp_path: Path, run: Any) -> None:
+    waves = waving(4, 5)
+    metadata = replace(waves.metadata, start_time=0.0, texts={"times": "0 100 250 300 301.5"})
+    gvpipe.write(replace(waves, metadata=metadata), tmp_path / "in.npz")
+    some = gvpipe.read(tmp_path / "in.npz", frames=(1, 4))
+    assert (some.metadata.texts["times"], some.metadata.start_time) == ("100 250 300", 100)
+    assert run("encode", tmp_path / "in.npz", tmp_path / "a.mp4").status == 0
+    assert run("decode", tmp_path / "a.mp4", tmp_path / "b.pvd", "--frames", "2:").status == 0
+    text = (tmp_path / "b.pvd").read_text()
+    assert [word.split('"')[1] for word in text.split("timestep=")[1:]] == ["250", "300", "301.5"]
+    assert time_steps(np.array([0, np.nan, 2]), 3, None).notes[0].startswith("the time of frame 1 is nan")
+
+
+def test_a_moved_mesh_has_no_old_normals(tmp_path: Path) -> None:
+    given = moved()
+    given = replace(given, attributes={"normal": np.tile(np.array([[0, 0, 1]], np.float32), (16, 1))})
+    given = replace(given, fields={**given.fields, "Displacement:2": given.fields["Displacement"]})
+    found = gvpipe.model.warp.warped(given, "Displacement:2")
+    assert "normal" not in found.attributes and any("'normal'" in note for note in found.notes)
+    assert np.allclose(found[3] - given[3], given.fields["Displacement"][3])  # the whole name first
+    wrong: Any = 3
+    with pytest.raises(TypeError, match="warp is 3"):
+        gvpipe.encode(given, tmp_path / "a.mp4", warp=wrong)
 
 
 def test_whole_numbers_come_back_exactly(tmp_path: Path, run: Any) -> None:

@@ -90,3 +90,66 @@ def test_references_that_lead_nowhere(tmp_path: Path) -> None:
     ):  # fmt: skip
         with pytest.raises(InputError, match=message):
             gvpipe.read(written(tmp_path / "a.xdmf", body))
+
+
+def test_collections_of_other_meshes_are_blocks(tmp_path: Path) -> None:
+    """Numbers stay with the mesh that they are of, whichever order collections have; names that are there twice are said."""
+
+    def numbered(grid: str, name: str, value: str) -> str:
+        number = f'<Attribute Name="{name}"><DataItem Dimensions="4" Format="XML">{value} 0 0 TIME</DataItem></Attribute>'
+        return grid.replace("</Grid>", f"{number}</Grid>")
+
+    far = MESH.replace('Name="mesh"', 'Name="far"').replace("0 0 0 1 0 0", "9 0 0 8 0 0")
+
+    def spatial(*grids: str) -> str:
+        return f'<Grid GridType="Collection" CollectionType="Spatial">{"".join(grids)}<Time Value="TIME" /></Grid>'
+
+    one = series(spatial(numbered(MESH, "T", "1"), numbered(far, "T", "2")))
+    two = series(spatial(numbered(far, "p", "4"), numbered(MESH, "p", "3")))
+    found = gvpipe.read(written(tmp_path / "a.xdmf", one + two))
+    assert [part.name for part in found.parts] == ["mesh", "far"] and found.shape == (3, 8, 3)
+    assert found.fields["T"][1][[0, 4]].tolist() == [1, 2] and found.fields["p"][1][[0, 4]].tolist() == [3, 4]
+    apart = series(numbered(MESH, "T", "1")) + series(numbered(far, "T", "2"))
+    found = gvpipe.read(written(tmp_path / "b.xdmf", apart))
+    assert found.shape == (3, 8, 3) and found.fields["T"][2][[0, 4]].tolist() == [1, 2]
+    twice = series(numbered(MESH, "T", "1")) + series(numbered(MESH, "T", "2"))
+    found = gvpipe.read(written(tmp_path / "c.xdmf", twice))
+    assert found.shape == (3, 4, 3) and any("'T'" in name for name in found.not_carried)
+
+
+def test_times_of_grids_that_are_referred_to(tmp_path: Path) -> None:
+    grids = "".join(MESH.replace('"mesh"', f'"g{k}"').replace("</Grid>", f'<Time Value="{k / 4}" /></Grid>') for k in range(3))
+    steps = "".join(f'<Grid Reference="XML">/Xdmf/Domain/Grid[@Name="g{k}"]</Grid>' for k in range(3))
+    body = f'<Grid Name="s" GridType="Collection" CollectionType="Temporal">{steps}</Grid>{grids}'
+    assert gvpipe.read(written(tmp_path / "a.xdmf", body)).fps == 4
+
+
+def test_files_that_would_take_for_ever(tmp_path: Path) -> None:
+    """Paths, grids and functions whose work grows with a power of their size are refused at once."""
+    deep = "<X>" * 150 + "</X>" * 150
+    path = f'<Attribute Name="T"><DataItem Reference="XML">{"//*" * 8}[@Name="no"]</DataItem></Attribute>'
+    tree = "".join(
+        f'<Grid Name="c{k}" GridType="Collection" CollectionType="Spatial">'
+        + f'<Grid Reference="XML">/Xdmf/Domain/Grid[@Name="c{k + 1}"]</Grid>' * 12
+        + "</Grid>"
+        for k in range(8)
+    )
+    tree += '<Grid Name="c8" GridType="Collection" CollectionType="Spatial" />'
+    items = '<DataItem Name="f0" Dimensions="2" Format="XML">1 2</DataItem>' + "".join(
+        f'<DataItem Name="f{k + 1}" ItemType="Function" Function="JOIN({";".join(f"${i}" for i in range(10))})">'
+        + f'<DataItem Reference="XML">/Xdmf/Domain/DataItem[@Name="f{k}"]</DataItem>' * 10
+        + "</DataItem>"
+        for k in range(10)
+    )
+    last = '<Attribute Name="T"><DataItem Reference="XML">/Xdmf/Domain/DataItem[@Name="f10"]</DataItem></Attribute>'
+    for body, message in (
+        (deep + MESH.replace("</Grid>", f"{path}</Grid>"), "which is not in the file"),
+        (tree, "more than 10000 grids"),
+        (items + MESH.replace("</Grid>", f"{last}</Grid>"), "nested more than"),
+    ):
+        with pytest.raises(InputError, match=message):
+            gvpipe.read(written(tmp_path / "a.xdmf", body))
+    for arrays in ([np.ones((3, 1)), np.ones((1, 3))], [np.ones(3), np.ones((3, 3))]):
+        with pytest.raises(ValueError, match="a DataItem's function is"):
+            evaluate("$0 + $1", arrays)
+    assert evaluate("$0 + $1 - 300", [np.array([200], np.uint8), np.array([200], np.uint8)]).tolist() == [100]
