@@ -34,7 +34,7 @@ WRONG_TYPES: dict[str, tuple[Callable[[Path], object], str]] = {
     "decode": (lambda p: untyped.decode(None), "None (NoneType); a path"),
     "write": (lambda p: untyped.write("a.npz", p / "b.npz"), "'a.npz' (str); a MeshSequence"),
     "write path": (lambda p: untyped.write(MeshSequence(TRIANGLE, FACES), 3), "path is 3 (int)"),
-    "compare": (lambda p: untyped.compare("a", "b"), "reference is 'a' (str); a MeshSequence"),
+    "compare": (lambda p: untyped.compare(1, 2), "reference is 1 (int); a MeshSequence"),
     "positions": (lambda p: untyped.MeshSequence("x", FACES), "positions are 'x' (str); an array"),
     "no positions": (lambda p: untyped.MeshSequence(None, FACES), "positions are None"),
     "fps": (lambda p: untyped.MeshSequence(TRIANGLE, FACES, "30"), "fps is '30' (str); a number"),
