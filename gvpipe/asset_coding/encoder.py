@@ -107,7 +107,7 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
         scan = scan_field(name, field, holes.holes, sequence.name)
         is_whole = scan.is_whole and scan.high > scan.low
         found = precision(given, field.kind, is_float, scan.high - scan.low, texels, f"field {name!r}", is_whole)
-        whole += [name] if is_whole and found.bound == 0 and given is None else []
+        whole += [name] if is_whole and given is None else []
         fields[name] = field, found, (scan.low, scan.high)
     return Plan(attributes, fields, images, tuple(left_out), tuple(whole))
 

@@ -9,7 +9,7 @@ Source: Kitware, vtkDataSetAttributes, ghost types.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -101,11 +101,7 @@ def _welded(step: Dataset, welding: Welding) -> Dataset:
         return step  # whoever makes the surface says which cell that is
     joined = Cells(cells.types, cells.offsets, target[cells.nodes])
     kept = points[rows]
-    return replace(step, points=_given(kept), cells=lambda: joined, point_data=_rows(step.point_data, rows))
-
-
-def _given(points: Floats) -> Callable[[], Floats]:
-    return lambda: points
+    return replace(step, points=lambda: kept, cells=lambda: joined, point_data=_rows(step.point_data, rows))
 
 
 def _flags(one: DataArray, n_rows: int | None = None) -> Array:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gvpipe.foundation.arrays import Array, Float64, Floats
+from gvpipe.foundation.arrays import Array, Float64
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
@@ -61,7 +61,7 @@ def from_vtk(
         TypeError: what is given is none of these.
     """
     if hasattr(datasets, "UpdateTimeStep") and hasattr(datasets, "GetOutputDataObject"):
-        steps = VtkSteps(partial(_output_at, datasets), *_steps_of(datasets))
+        steps = _reader_steps(datasets)
     else:
         listed = [datasets] if hasattr(datasets, "IsA") else list(_sequence(datasets))
         steps = VtkSteps(lambda step: listed[step], len(listed), None)
@@ -116,7 +116,7 @@ def read_by_vtk(path: Path, options: ReadOptions) -> MeshSequence:
     for call in EVERYTHING:
         if hasattr(reader, call):
             getattr(reader, call)()
-    return read_steps(VtkSteps(partial(_output_at, reader), *_steps_of(reader)), path, options)
+    return read_steps(_reader_steps(reader), path, options)
 
 
 class VtkSteps:
@@ -137,7 +137,7 @@ class VtkSteps:
         named = list(_leaves(given, "", 0))
         if not named:
             raise ValueError("its data object has no mesh")
-        return join_blocks(named) if len(named) > 1 or _is_composite(given) else named[0][1]
+        return join_blocks(named) if len(named) > 1 or given.IsA("vtkCompositeDataSet") else named[0][1]
 
 
 def _sequence(datasets: Any) -> Iterable[Any]:
@@ -150,26 +150,21 @@ def _sequence(datasets: Any) -> Iterable[Any]:
     return listed
 
 
-def _steps_of(reader: Any) -> tuple[int, Float64 | None]:
-    """How many time steps a reader has, and their times."""
+def _reader_steps(reader: Any) -> VtkSteps:
+    """The time steps of a reader; one that has none is one step."""
     reader.UpdateInformation()
     held = reader.GetOutputInformation(0)
     key = import_module("vtkmodules.vtkCommonExecutionModel").vtkStreamingDemandDrivenPipeline.TIME_STEPS()
     times = np.array(held.Get(key), np.float64) if held.Has(key) else np.zeros(0)
-    return max(len(times), 1), times if len(times) else None
 
+    def at(step: int) -> Any:
+        if len(times):
+            reader.UpdateTimeStep(float(times[step]))
+        else:
+            reader.Update()
+        return reader.GetOutputDataObject(0)
 
-def _output_at(reader: Any, step: int) -> Any:
-    times = _steps_of(reader)[1]
-    if times is None:
-        reader.Update()
-    else:
-        reader.UpdateTimeStep(float(times[step]))
-    return reader.GetOutputDataObject(0)
-
-
-def _is_composite(given: Any) -> bool:
-    return bool(given.IsA("vtkCompositeDataSet") or given.IsA("vtkPartitionedDataSetCollection"))
+    return VtkSteps(at, max(len(times), 1), times if len(times) else None)
 
 
 def _leaves(given: Any, name: str, depth: int) -> Iterator[tuple[str, Dataset]]:
@@ -218,22 +213,16 @@ def _dataset(given: Any) -> Dataset:
     whole = given.GetFieldData()
     left.add_all(field_data(whole.GetArrayName(k) or "unnamed") for k in range(whole.GetNumberOfArrays()))
     cells = _cells(given, dimensions)
-    return Dataset(_given(points), _given_cells(cells), point_data, cell_data, not_carried=left.names)
-
-
-def _given(points: Floats) -> Callable[[], Floats]:
-    return lambda: points
-
-
-def _given_cells(cells: Cells) -> Callable[[], Cells]:
-    return lambda: cells
+    return Dataset(lambda: points, lambda: cells, point_data, cell_data, not_carried=left.names)
 
 
 def _cells(given: Any, dimensions: Sequence[int] | None) -> Cells:
     if given.IsA("vtkUnstructuredGrid"):
         held = given.GetCells()
-        types = given.GetCellTypes() if hasattr(given, "GetCellTypes") else given.GetCellTypesArray()
-        types = types if types is not None and hasattr(types, "GetNumberOfTuples") else given.GetCellTypesArray()
+        try:
+            types = given.GetCellTypes()
+        except TypeError:  # before VTK 9.6
+            types = given.GetCellTypesArray()
         return Cells(
             _numpy(types).astype(np.uint8).reshape(-1),
             _numpy(held.GetOffsetsArray()).astype(np.int64),
