@@ -115,7 +115,10 @@ def _samples() -> dict[str, MeshSequence]:
 def _scenes() -> dict[str, MeshSequence]:
     """A scene with all that files hold, and its parts alone, whose cases take less time."""
     scene: MeshSequence = _of_tests("asset_scene.py").scene(N_FRAMES)
+    cells = _of_tests("asset_coding/test_reduction.py")
+    by_polygon = gvpipe.Field(np.repeat(cells.by_cell(), 2, axis=1).astype(np.float64) + 1e7, "triangle")
     return {
+        "cells": cells.quads(cells=by_polygon).part(0, N_FRAMES),
         "scene": scene,
         "layers": replace(scene, fields={}),
         "fields": MeshSequence(scene.positions, scene.faces, scene.fps, fields=scene.fields),

@@ -176,7 +176,8 @@ def encode(
             bounded memory) or ``"archive"`` (the smallest); see `gvpipe.rate_control.purposes`.
         attributes: by name, the largest error of a static attribute: a number (degrees for normals), a part of its range
             such as ``"0.1%"``, ``"exact"``, or ``"none"`` to leave it out. Defaults: `gvpipe.asset_coding.bounds`.
-        fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes.
+        fields: the same for animated fields; ``"0.1%,nan=keep"`` keeps NaN as holes, ``"1%,by=length"`` bounds the length
+            of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
         clip, mesh, frames, unlimited, real_time, warp: as for `read`.

@@ -18,7 +18,7 @@ from uuid import UUID
 PREFIXED = ("GVCODECS.LAPLACIAN", "GVCODECS.PCA", "GVCODECS.PDCT")
 TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
-    "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL",
+    "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL REDUCED",
     "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
     "gvpipe.attributes.linear_kernels": "AFFINE PARALLELOGRAM",
     "gvpipe.attributes.match_kernels": "N_MATCH_CONTEXTS N_RESIDUAL_CONTEXTS",

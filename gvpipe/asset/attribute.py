@@ -6,6 +6,7 @@ a vertex have different indices.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -137,6 +138,17 @@ def guess_kind(name: str, values: Array) -> str:
 
 def as_values(given: Any, name: str) -> Array:
     """An array of float32 or of integers; raises `InputError` for what is neither."""
+    values = as_numbers(given, name)
+    if values.dtype == np.float64:
+        lost, spread = rounding_of([values])
+        raise InputError(
+            f"{name}: float32 would round its values by up to {lost:.2g} of a range of {spread:.2g}; subtract an offset first"
+        )
+    return values
+
+
+def as_numbers(given: Any, name: str) -> Array:
+    """As `as_values`, but float64 stays as it is where float32 does not do."""
     values = np.asarray(given)
     if values.dtype.kind == "b":
         return values.astype(np.uint8)
@@ -144,15 +156,27 @@ def as_values(given: Any, name: str) -> Array:
         raise InputError(f"{name} has type {values.dtype}; numbers are needed")
     if values.dtype.kind != "f" or values.dtype == np.float32:
         return values
+    if needs_float64([values]):
+        return values.astype(np.float64, copy=False)
     with np.errstate(over="ignore", invalid="ignore"):
-        narrowed = values.astype(np.float32)
-        lost = float(np.nanmax(np.abs(values - narrowed), initial=0.0)) if values.size else 0.0
-        spread = float(np.fmax.reduce(values, axis=None) - np.fmin.reduce(values, axis=None)) if values.size else 0.0
-    if np.isfinite(lost) and lost > MOST_ROUNDED * spread > 0:
-        raise InputError(
-            f"{name}: float32 would round its values by up to {lost:.2g} of a range of {spread:.2g}; subtract an offset first"
-        )
-    return narrowed
+        return values.astype(np.float32)
+
+
+def needs_float64(blocks: Sequence[Array]) -> bool:
+    """Whether float32 would move a value by more than 1e-4 of the range of all ``blocks``."""
+    lost, spread = rounding_of(blocks)
+    return bool(np.isfinite(lost)) and lost > MOST_ROUNDED * spread > 0
+
+
+def rounding_of(blocks: Sequence[Array]) -> tuple[float, float]:
+    """By how much float32 moves values of ``blocks`` at most, and their range; NaN left out."""
+    lost, low, high = 0.0, np.inf, -np.inf
+    with np.errstate(over="ignore", invalid="ignore"):
+        for values in (each for each in blocks if each.size):
+            lost = max(lost, float(np.nanmax(np.abs(values - values.astype(np.float32)), initial=0.0)))
+            low = min(low, float(np.fmin.reduce(values, axis=None)))
+            high = max(high, float(np.fmax.reduce(values, axis=None)))
+    return lost, high - low
 
 
 def check_word(what: str, word: object, words: tuple[str, ...], name: str) -> None:

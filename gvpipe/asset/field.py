@@ -8,12 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gvpipe.asset.attribute import KINDS, MAX_COMPONENTS, as_values, check_kind, check_text, check_word
+from gvpipe.asset.attribute import KINDS, MAX_COMPONENTS, as_numbers, check_kind, check_text, check_word
 from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.errors import InputError
 
 DOMAINS = ("vertex", "triangle")
-DTYPES = ("float32", "int8", "uint8", "int16", "uint16", "int32", "uint32")
 
 
 class FieldFrames(Protocol):
@@ -34,8 +33,8 @@ class Field:
 
     Args:
         values: ``(F, R)`` or ``(F, R, C)``, R vertices or triangles: an array, or anything of that shape that slices by
-            frame. float32 or integers of at most 32 bits; float64 is rounded to float32, and an array of it is refused where
-            that moves a value by more than 1e-4 of the range.
+            frame. float32, float64 or integers of at most 32 bits. An array of float64 is rounded to float32, unless that
+            moves a value by more than 1e-4 of the range (an absolute pressure of 101325 +- 1 Pa).
         domain: ``"vertex"`` or ``"triangle"``.
         kind: as of `gvpipe.Attribute`; ``""``: scalar, or vector for several components.
         unit: such as ``"MPa"``.
@@ -68,7 +67,7 @@ class Field:
             )
         if np.dtype(given.dtype).kind not in "fiub" or np.dtype(given.dtype).name in ("int64", "uint64"):
             raise InputError(f"{self.name} has type {given.dtype}; floating-point numbers or integers of 32 bits are needed")
-        object.__setattr__(self, "values", as_values(given, self.name) if isinstance(given, np.ndarray) else given)
+        object.__setattr__(self, "values", as_numbers(given, self.name) if isinstance(given, np.ndarray) else given)
         object.__setattr__(self, "kind", self.kind or ("vector" if len(shape) == 3 and shape[2] > 1 else "scalar"))
         check_word("domain", self.domain, DOMAINS, self.name)
         check_text(self.unit, f"unit of {self.name}")
@@ -82,16 +81,21 @@ class Field:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The numbers' type: float32 or integers."""
+        """The numbers' type: float32, float64 or integers."""
         given = np.dtype(self.values.dtype)
         if given.kind == "b":
             return np.dtype(np.uint8)
-        return np.dtype(np.float32) if given.kind == "f" else given.newbyteorder("=")
+        return np.dtype(np.float32) if given.name == "float16" else given.newbyteorder("=")
 
     @property
     def n_components(self) -> int:
         """C, 1 for ``(F, R)``."""
         return self.shape[2] if len(self.shape) == 3 else 1
+
+    @property
+    def is_by_polygon(self) -> bool:
+        """Whether it is known that all triangles of each polygon have the same numbers, as where a file has them by polygon."""
+        return bool(getattr(self.values, "is_by_polygon", False))
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -163,6 +167,7 @@ class _Span:
         self._whole, self._start = whole, start
         self.shape: tuple[int, ...] = (stop - start, *whole.shape[1:])
         self.dtype = whole.dtype
+        self.is_by_polygon = whole.is_by_polygon
 
     def __getitem__(self, key: slice, /) -> Array:
         start, stop, _ = key.indices(self.shape[0])

@@ -22,7 +22,7 @@ TEXELS = 0.25
 UV = 1 / 8192
 DEGREES = 1.0
 PART = 1e-3  # of the range
-KEEP_NAN = ",nan=keep"
+KEEP_NAN, BY_LENGTH = "nan=keep", "by=length"  # behind a bound, each after a comma
 
 Given = Mapping[str, float | str]
 
@@ -33,7 +33,7 @@ class Precision:
 
     Args:
         is_kept: whether it is in the file at all.
-        bound: largest error of a number, degrees for normals and tangents; 0: exact.
+        bound: largest error of a number (of each component), degrees for normals and tangents; 0: exact.
         holes: whether NaN is kept as it is.
     """
 
@@ -46,33 +46,45 @@ NOT_KEPT = Precision(is_kept=False)
 
 
 def precision(
-    given: float | str | None, kind: str, is_float: bool, spread: float, texels: int, what: str, is_whole: bool = False
+    given: float | str | None,
+    kind: str,
+    is_float: bool,
+    spread: float,
+    texels: int,
+    what: str,
+    is_whole: bool = False,
+    vectors: tuple[int, float] = (1, 0.0),
 ) -> Precision:
     """Return the precision of one attribute or field.
 
     Args:
         given: ``"none"``, ``"exact"``, a number, a part of the range such as ``"0.1%"``, each with ``",nan=keep"`` behind it
-            if a field has holes; None: the default.
+            if a field has holes, or ``",by=length"`` to bound the length of a vector's error, a part then of the longest; None:
+            the default.
         kind: of the numbers.
         is_float: whether they are floating-point numbers.
         spread: largest less smallest value.
         texels: side of the largest image, 0 without images.
         what: it is, for messages.
         is_whole: whether all are whole numbers.
+        vectors: components, and the length of the longest vector.
 
     Raises:
         SettingError: the text is none of these, or the bound is no number above 0.
     """
-    text = "" if given is None else str(given).strip().lower()
-    holes = text.endswith(KEEP_NAN)
-    text = text.removesuffix(KEEP_NAN)
+    text, *more = ("" if given is None else str(given).strip().lower()).split(",")
+    holes, by_length = KEEP_NAN in more, BY_LENGTH in more
+    if set(more) - {KEEP_NAN, BY_LENGTH}:
+        raise SettingError(f"{what}: {given!r} cannot be a bound; behind a comma, {KEEP_NAN} or {BY_LENGTH} is needed")
     if text == "none":
         return NOT_KEPT
     if text == "exact" or (not text and (not is_float or is_whole or kind in ("color", "label"))):
         return Precision(holes=holes)
     if not text:
         return Precision(bound=_default(kind, spread, texels), holes=holes)
-    bound = _parse(text, spread, what)
+    bound = _parse(text, vectors[1] if by_length else spread, what)
+    if by_length:
+        bound /= math.sqrt(vectors[0])  # of each component
     return Precision(bound=bound if is_float else max(math.floor(bound), 0), holes=holes)
 
 

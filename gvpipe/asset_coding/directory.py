@@ -23,6 +23,7 @@ from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
+from gvpipe.asset_coding.reduction import Reduction, read_reduction
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
 from gvpipe.foundation.arrays import Int64
@@ -30,7 +31,7 @@ from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import FormatError, InputError, corrupt_section, printable
 
 SECTION, ARRANGEMENT = "asset", "arrangement"
-CODED, SURFACE, OCTAHEDRAL = 1, 2, 3  # codings of fields; attributes have the first
+CODED, SURFACE, OCTAHEDRAL, REDUCED = 1, 2, 3, 4  # codings of fields; attributes have the first
 VERSION = 1
 MOST = 1 << 16  # parts, materials, images, attributes or fields
 MAX_BYTES = 1 << 26  # of the JSON, inflated
@@ -49,6 +50,7 @@ class Listed:
         coding: of the section.
         section: its name.
         range: smallest and largest value of a field.
+        reduced: what of a field its section has once, for coding `REDUCED`.
     """
 
     name: str
@@ -61,6 +63,12 @@ class Listed:
     coding: int
     section: str
     range: tuple[float, float] | None = None
+    reduced: Reduction | None = None
+
+    @property
+    def type(self) -> str:
+        """The type of its numbers; ``dtype`` is that of the section."""
+        return "float64" if self.reduced is not None and self.reduced.offsets else self.dtype
 
 
 @dataclass(frozen=True)
@@ -110,8 +118,8 @@ def pack_directory(directory: Directory, n_vertices: int) -> bytes:
             "version": VERSION,
             "parts": [_part_values(part) for part in directory.parts],
             "geometry": directory.geometry,
-            "attributes": [dataclasses.asdict(each) for each in directory.attributes],
-            "fields": [dataclasses.asdict(each) for each in directory.fields],
+            "attributes": [_listed_values(each) for each in directory.attributes],
+            "fields": [_listed_values(each) for each in directory.fields],
             "materials": [to_plain(material) for material in directory.materials],
             "images": [dataclasses.asdict(image) for image in directory.images],
             "metadata": to_plain(directory.metadata),
@@ -169,7 +177,7 @@ def is_known(listed: Listed) -> bool:
     """Whether this version reads a field's coding."""
     if listed.coding in (SURFACE, OCTAHEDRAL):
         return listed.kind == "normal" and listed.components == 3 and listed.domain in ("vertex", "triangle")
-    return listed.coding == CODED
+    return listed.coding in (CODED, REDUCED)
 
 
 def file_notes(directory: Directory, bitstream: Bitstream) -> tuple[str, ...]:
@@ -202,19 +210,28 @@ def _read_part(values: JsonObject, n_vertices: int, n_materials: int) -> Part:
     return Part(values.text("name"), (low, high), (0, 0), material, values.text("parent", ""))
 
 
+def _listed_values(listed: Listed) -> dict[str, Any]:
+    values = dataclasses.asdict(listed)
+    del values["reduced"]
+    return values if listed.reduced is None else {**values, "reduced": listed.reduced.values()}
+
+
 def _read_listed(values: JsonObject, domains: tuple[str, ...]) -> Listed:
     low, high = values.numbers("range", 2, -HUGE, HUGE) if "range" in values else (None, None)
+    domain, coding = values.choice("domain", domains), values.integer("coding", 0, 1 << 16)
+    components = values.integer("components", 0, MAX_COMPONENTS)
     return Listed(
         name=values.text("name"),
         kind=values.choice("kind", KINDS),
-        domain=values.choice("domain", domains),
-        components=values.integer("components", 0, MAX_COMPONENTS),
+        domain=domain,
+        components=components,
         dtype=values.choice("dtype", DTYPES),
         unit=values.text("unit", ""),
         bound=values.number("bound", 0, HUGE),
-        coding=values.integer("coding", 0, 1 << 16),
+        coding=coding,
         section=values.text("section"),
         range=None if low is None or high is None else (low, high),
+        reduced=read_reduction(values.object("reduced"), max(components, 1), domain) if coding == REDUCED else None,
     )
 
 

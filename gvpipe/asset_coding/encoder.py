@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +24,7 @@ from gvpipe.asset_coding.directory import (
     ARRANGEMENT,
     CODED,
     OCTAHEDRAL,
+    REDUCED,
     SECTION,
     SURFACE,
     Directory,
@@ -36,7 +36,8 @@ from gvpipe.asset_coding.directory import (
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
-from gvpipe.asset_coding.scan import WHOLE_KINDS, are_whole, scan_field
+from gvpipe.asset_coding.reduction import NO_REDUCTION, Reduction
+from gvpipe.asset_coding.scan import WHOLE_KINDS, Scan, are_whole, longest_vector, scan_field
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
@@ -50,6 +51,7 @@ from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.octahedral import angular_bound, to_octahedral
 from gvpipe.fields.values import FieldBound
 from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.model.sequence import MeshSequence
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
@@ -60,14 +62,14 @@ class Plan:
     """What is coded, and how finely: everything that does not depend on a bitstream.
 
     Args:
-        attributes, fields: by name, with their precision, and for fields their range.
+        attributes, fields: by name, with their precision, and of fields what they are.
         images: as they go into the file.
         left_out: names of what a user asked to leave out.
         whole: names of floats that are kept exactly, since all are whole numbers and nobody asked otherwise.
     """
 
     attributes: dict[str, tuple[Attribute, Precision]]
-    fields: dict[str, tuple[Field, Precision, tuple[float, float]]]
+    fields: dict[str, tuple[Field, Precision, Scan]]
     images: tuple[Image, ...]
     left_out: tuple[str, ...]
     whole: tuple[str, ...] = ()
@@ -91,7 +93,8 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
         is_float = values.dtype.kind == "f"
         is_whole = is_float and spread > 0 and attribute.kind in WHOLE_KINDS and are_whole(values)
         given = options.attributes.get(name)
-        found = precision(given, attribute.kind, is_float, spread, texels, f"attribute {name!r}", is_whole)
+        vectors = (values.shape[1], longest_vector(values))
+        found = precision(given, attribute.kind, is_float, spread, texels, f"attribute {name!r}", is_whole, vectors)
         whole += [name] if is_whole and given is None else []
         if found.is_kept:
             attributes[name] = attribute, found
@@ -100,15 +103,21 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     for name, field in sequence.fields.items():
         given = options.fields.get(name)
         is_float = field.dtype.kind == "f"
-        holes = precision(given, field.kind, is_float, 1.0, texels, f"field {name!r}")
+        holes = precision(given, field.kind, is_float, 1.0, texels, f"field {name!r}", vectors=(1, 1.0))
         if not holes.is_kept:
             left_out.append(name)
             continue
-        scan = scan_field(name, field, holes.holes, sequence.name)
+        scan = scan_field(name, field, holes.holes, sequence.name, sequence.polygons)
         is_whole = scan.is_whole and scan.high > scan.low
-        found = precision(given, field.kind, is_float, scan.high - scan.low, texels, f"field {name!r}", is_whole)
+        vectors = (field.n_components, scan.longest)
+        found = precision(given, field.kind, is_float, scan.high - scan.low, texels, f"field {name!r}", is_whole, vectors)
         whole += [name] if is_whole and given is None else []
-        fields[name] = field, found, (scan.low, scan.high)
+        if scan.rounding > found.bound / 2:
+            raise InputError(
+                f"{sequence.name}: field {name!r} is float64, and float32 rounds it by up to {scan.rounding:.2g} once "
+                f"{scan.reduction.offsets} is subtracted; give it a bound of {2 * scan.rounding:.2g} or more by --field"
+            )
+        fields[name] = field, found, scan
     return Plan(attributes, fields, images, tuple(left_out), tuple(whole))
 
 
@@ -160,7 +169,7 @@ class AssetCoder:
             sections[ARRANGEMENT] = arranged
         origins = Origins(permutation, sources.corners, sources.triangles)
         attributes = self._add_attributes(sections, origins, surface)
-        fields = self._add_fields(sections, origins, surface, reader if is_final else None)
+        fields = self._add_fields(sections, origins, surface, arrangement.polygons, reader if is_final else None)
         images = []
         for number, image in enumerate(self.plan.images):
             images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
@@ -214,42 +223,87 @@ class AssetCoder:
         return tuple(listed)
 
     def _add_fields(
-        self, sections: dict[str, bytes], origins: Origins, surface: Surface, reader: FrameReader | None
+        self,
+        sections: dict[str, bytes],
+        origins: Origins,
+        surface: Surface,
+        polygons: Int32 | None,
+        reader: FrameReader | None,
     ) -> tuple[Listed, ...]:
         listed = []
-        for number, (name, (field, found, span)) in enumerate(self.plan.fields.items()):
+        for number, (name, (field, found, scan)) in enumerate(self.plan.fields.items()):
             section = f"field.{number}"
             rows = origins.of(field.domain)
             assert rows is not None  # fields are on vertices or triangles
-            coding, sections[section] = self._code_field(name, field.select(rows), found, surface, reader)
+            job = _FieldJob(name, field.select(rows), found, scan, surface, polygons)
+            coding, sections[section] = self._code_field(job, reader)
             components = field.n_components if len(field.shape) == 3 else 0
-            listed.append(_listed(name, field, components, found.bound, section, span, coding))
+            made = _listed(name, field, components, found.bound, section, (scan.low, scan.high), coding)
+            listed.append(dataclasses.replace(made, reduced=job.reduction) if coding == REDUCED else made)
         return tuple(listed)
 
-    def _code_field(
-        self, name: str, field: Field, found: Precision, surface: Surface, reader: FrameReader | None
-    ) -> tuple[int, bytes]:
-        """The coding and the section of a field whose rows are as they are decoded."""
-        is_normal = field.kind == "normal" and found.bound > 0
-        if is_normal and reader is not None:
+    def _code_field(self, job: _FieldJob, reader: FrameReader | None) -> tuple[int, bytes]:
+        """The coding and the section of a field."""
+        field, found, surface = job.field, job.found, job.surface
+        if job.is_normal and reader is not None:
             rule = find_normal_rule(field, reader, surface, found.bound)
             if rule is not None:
                 return SURFACE, pack_rule(rule)
+        domain, polygons = job.rows
         key = hashlib.sha256(surface.faces.tobytes()).digest()
-        mesh = self._meshes.setdefault((field.domain, key), FieldMesh(surface.faces, surface.n_vertices, field.domain))
-        if is_normal:
-            bound = angular_bound(found.bound)
-            read: Callable[[int, int], Array] = lambda start, stop: to_octahedral(field.read(start, stop), start, name)  # noqa: E731  # it closes over the field
-        else:
-            bound, read = FieldBound(found.bound) if found.bound else FieldBound(exact=True), field.read
-        codings = [self._fields[name, key]] if (name, key) in self._fields else []
+        made = FieldMesh(surface.faces, surface.n_vertices, domain, polygons)
+        mesh = self._meshes.setdefault((domain, key), made)
+        codings = [self._fields[job.name, key]] if (job.name, key) in self._fields else []
         if reader is not None and field.kind in MOVING and found.bound:
-            codings.append(encode_field(read, len(field), mesh, bound, name, positions=reader.read, holes=found.holes))
+            codings.append(
+                encode_field(job.read, len(field), mesh, job.bound, job.name, positions=reader.read, holes=found.holes)
+            )
         elif not codings:
-            codings.append(encode_field(read, len(field), mesh, bound, name, holes=found.holes))
-            self._fields[name, key] = codings[0]
-        data = min(codings, key=len)
-        return (OCTAHEDRAL if is_normal else CODED), data
+            codings.append(encode_field(job.read, len(field), mesh, job.bound, job.name, holes=found.holes))
+            self._fields[job.name, key] = codings[0]
+        coding = OCTAHEDRAL if job.is_normal else CODED if job.reduction == NO_REDUCTION else REDUCED
+        return coding, min(codings, key=len)
+
+
+@dataclass(frozen=True, eq=False)
+class _FieldJob:
+    """A field whose rows are as they are decoded, on the mesh as it is decoded."""
+
+    name: str
+    field: Field
+    found: Precision
+    scan: Scan
+    surface: Surface
+    polygons: Int32 | None
+
+    @property
+    def is_normal(self) -> bool:
+        """Whether it is coded as directions."""
+        return self.field.kind == "normal" and self.found.bound > 0
+
+    @property
+    def reduction(self) -> Reduction:
+        """What its section has once."""
+        return NO_REDUCTION if self.is_normal else self.scan.reduction
+
+    @property
+    def rows(self) -> tuple[str, Int32 | None]:
+        """The domain of its section's rows, and the polygons that they are."""
+        return ("polygon", self.polygons) if self.reduction.polygons else (self.field.domain, None)
+
+    @property
+    def bound(self) -> FieldBound:
+        """What the section keeps."""
+        if self.is_normal:
+            return angular_bound(self.found.bound)
+        return FieldBound(self.found.bound - self.scan.rounding) if self.found.bound else FieldBound(exact=True)
+
+    def read(self, start: int, stop: int) -> Array:
+        """Frames as the section has them."""
+        block = self.field.read(start, stop)
+        if self.is_normal:
+            return to_octahedral(block, start, self.name)
+        return self.reduction.reduce(block, self.polygons)
 
 
 @dataclass(frozen=True)
@@ -274,7 +328,8 @@ def _listed(
     span: tuple[float, float] | None = None,
     coding: int = CODED,
 ) -> Listed:
-    return Listed(name, given.kind, given.domain, components, given.dtype.name, given.unit, bound, coding, section, span)
+    dtype = given.dtype.name if given.dtype != np.float64 else "float32"  # what is left of float64 behind an offset
+    return Listed(name, given.kind, given.domain, components, dtype, given.unit, bound, coding, section, span)
 
 
 def _with_losses(sequence: MeshSequence) -> Metadata:

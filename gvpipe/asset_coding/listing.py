@@ -56,7 +56,7 @@ def _listed(things: Iterable[Listed], bitstream: Bitstream) -> list[dict[str, An
             "kind": each.kind,
             "domain": each.domain,
             "components": max(each.components, 1),
-            "type": each.dtype,
+            "type": each.type,
             "unit": each.unit,
             "bound": each.bound,
             "bytes": bitstream.section_sizes.get(each.section, 0),

@@ -6,6 +6,7 @@ Attributes and fields are decoded when they are asked for.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -30,6 +31,7 @@ from gvpipe.asset_coding.directory import (
     read_images,
     vertex_starts,
 )
+from gvpipe.asset_coding.reduction import NO_REDUCTION
 from gvpipe.coding.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.arrays import Array, Float32, Int32
@@ -201,7 +203,6 @@ class AssetReader:
     def _frames_of(self, listed: Listed) -> Callable[[int, int], Array]:
         """What decodes frames of a field: ``(start, stop) -> (n, R, C)``."""
         from gvpipe.asset_coding.normal_fields import unpack_rule
-        from gvpipe.fields.mesh import FieldMesh
         from gvpipe.fields.octahedral import from_octahedral
         from gvpipe.fields.reader import FieldReader
 
@@ -209,14 +210,29 @@ class AssetReader:
         if listed.coding == SURFACE:
             rule = unpack_rule(data, listed.section)
             return lambda start, stop: rule.normals(self._read(start, stop), self._surface)
-        if listed.domain not in self._meshes:
-            _keep_rows(self._bitstream.budget, listed.domain, self._bitstream.n_vertices, len(self.faces))
-            self._meshes[listed.domain] = FieldMesh(self.faces, self._bitstream.n_vertices, listed.domain)
-        mesh = self._meshes[listed.domain]
+        reduced, polygons = listed.reduced or NO_REDUCTION, self.polygons
+        if reduced.polygons and polygons is None:
+            raise corrupt_section(SECTION, f"field {listed.name!r} has a row per polygon, and there are triangles alone")
+        mesh = self._mesh(*(("polygon", polygons) if reduced.polygons else (listed.domain, None)))
         reader = FieldReader(data, self._bitstream.n_frames, mesh, listed.section, self._read, budget=self._bitstream.budget)
         if listed.coding == OCTAHEDRAL:
             return lambda start, stop: from_octahedral(_of_two(reader.read(start, stop), listed))
-        return reader.read
+        if reduced == NO_REDUCTION:
+            return reader.read
+        n_coded = max(reduced.columns, default=max(listed.components, 1) - 1) + 1
+        if reader.n_components != n_coded or reader.dtype.name != listed.dtype:
+            raise corrupt_section(listed.section, "it does not hold what the section 'asset' lists")
+        self._bitstream.budget.ask(f"field {listed.name!r}", 8 * math.prod(self._shape_of(listed)[1:]))
+        return lambda start, stop: reduced.restore(reader.read(start, stop), polygons)
+
+    def _mesh(self, domain: str, polygons: Int32 | None) -> FieldMesh:
+        """The mesh under fields whose sections have a row per ``domain``."""
+        from gvpipe.fields.mesh import FieldMesh
+
+        if domain not in self._meshes:
+            _keep_rows(self._bitstream.budget, domain, self._bitstream.n_vertices, len(self.faces))
+            self._meshes[domain] = FieldMesh(self.faces, self._bitstream.n_vertices, domain, polygons)
+        return self._meshes[domain]
 
 
 class _FieldValues:
@@ -226,8 +242,9 @@ class _FieldValues:
         self, read: Callable[[int, int], Array], shape: tuple[int, ...], listed: Listed, lock: ForkLock, path: str
     ) -> None:
         self._read, self._lock, self._listed, self._path = read, lock, listed, path
-        self.dtype = np.dtype(listed.dtype)
+        self.dtype = np.dtype(listed.type)
         self.shape: tuple[int, ...] = shape
+        self.is_by_polygon = listed.reduced is not None and listed.reduced.polygons
 
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError(

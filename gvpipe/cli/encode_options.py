@@ -53,7 +53,8 @@ OPTIONS = (
         "fields",
         multiple=True,
         metavar="NAME=BOUND",
-        help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes.",
+        help="The same for an animated field; 0.1%,nan=keep keeps NaN as holes, "
+        "1%,by=length bounds the length of a vector's error.",
     ),
     click.option("--clip", metavar="NAME", help="The animation to read, of a file that has several. [default: the first]"),
     click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy)."),

@@ -7,7 +7,8 @@ A value's part that follows is a sum of signals of its row, with a matrix of coe
 
     derivation = [8 bits] kind, [varint] reference frame r, C x S x [float32] coefficients
 
-p(t) is the decoded position of the row's vertex, or the mean of its triangle's, in frame t of the sequence; before its start
+p(t) is the decoded position of the row's vertex, or the mean of its triangle's (of a polygon the mean of its triangles'
+means), in frame t of the sequence; before its start
 and behind its end t stops. What does not follow is coded by `gvpipe.fields.prediction`. A row's own constant is among that,
 so that the reference need not be frame 0.
 
@@ -61,11 +62,7 @@ class Motion:
         if points.shape != (stop - start, self.mesh.n_vertices, 3):
             needed = (stop - start, self.mesh.n_vertices, 3)
             raise InputError(f"positions of frames {start} to {stop - 1} have shape {points.shape}; {needed} is needed")
-        exact = points.astype(np.float64)
-        if self.mesh.domain == "vertex":
-            return exact
-        a, b, c = self.mesh.faces.T
-        return np.asarray((exact[:, a] + exact[:, b] + exact[:, c]) / 3)
+        return self.mesh.middles(points.astype(np.float64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,3 +58,9 @@ def unit_note(sequence: MeshSequence, format_name: str) -> tuple[str, ...]:
     units = list(dict.fromkeys(f"{name} ({one.unit})" for name, one in every if one.unit))
     listed = ", ".join(units[:LISTED]) + (f" and {len(units) - LISTED} more" if len(units) > LISTED else "")
     return (f"{format_name} has no units of numbers; those of {listed} were left out",) if units else ()
+
+
+def wide_note(sequence: MeshSequence, format_name: str) -> tuple[str, ...]:
+    """The note for float64 fields that a format holds as float32."""
+    wide = [name for name, one in sequence.fields.items() if one.dtype.name == "float64"]
+    return (f"{format_name} holds float32; digits of {', '.join(wide[:LISTED])} are lost",) if wide else ()

@@ -16,7 +16,7 @@ from folders import DATA, SAMPLES
 from waves import EXACT, SHEET, SHEET_FACES, wave
 
 import gvpipe
-from gvpipe.asset_coding.directory import OCTAHEDRAL, Listed
+from gvpipe.asset_coding.directory import OCTAHEDRAL, REDUCED, Listed
 from gvpipe.fields import head
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
@@ -43,6 +43,7 @@ class Job:
 
     faces: Array
     positions: Array
+    polygons: Array | None = None
     data: bytearray = field(default_factory=bytearray)
     fields: list[Any] = field(default_factory=list)
     values: list[Array] = field(default_factory=list)
@@ -57,12 +58,19 @@ class Job:
         entry = {"name": listed.name, "kind": listed.kind, "domain": listed.domain, "components": listed.components}
         entry |= {"section": listed.section, "type": listed.dtype, "bound": listed.bound}
         given = {"entry": entry, "isOctahedral": listed.coding == OCTAHEDRAL, "data": self.put(section)}
+        given["reduced"] = None if listed.reduced is None else listed.reduced.values()
         self.fields.append({**given, "rows": values.shape[1], "frames": list(frames)})
         self.values.append(values[list(frames)])
 
     def run(self, folder: Path) -> str:
         """Run it, compare what comes back, and return what was printed."""
-        job = {"vertexCount": self.positions.shape[1], "frameCount": len(self.positions), "fields": self.fields}
+        polygons = None if self.polygons is None else self.polygons.tolist()
+        job = {
+            "polygons": polygons,
+            "vertexCount": self.positions.shape[1],
+            "frameCount": len(self.positions),
+            "fields": self.fields,
+        }
         positions = [self.put(np.ascontiguousarray(frame, "<f4")) for frame in self.positions]
         text = json.dumps({**job, "positions": positions, "faces": self.put(self.faces.astype("<i4"))})
         (folder / "job.json").write_text(text)
@@ -137,6 +145,36 @@ def test_fields_of_a_sample_are_python_s(tmp_path: Path) -> None:
         (listed,) = video.directory.fields
         values = video.fields["strain"].read(0, len(video))
         job.add(listed, video.bitstream.section(listed.section), values, [47, 0, 20])
+    assert job.run(tmp_path) == ""
+
+
+def test_what_repeats_is_python_s(tmp_path: Path) -> None:
+    """Rows of polygons, equal components, offsets of float64; some of them together."""
+    side = np.arange(len(SHEET)).reshape(round(len(SHEET) ** 0.5), -1)
+    quads = np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces, positions = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32), moving()
+    counts = np.full(len(quads), 4)
+    rng, t = np.random.default_rng(7), np.arange(N_FRAMES)[:, None, None]
+    noise = 0.02 * rng.normal(size=(N_FRAMES, len(quads), 6))
+    six = np.sin(SHEET[quads].mean(axis=1)[:, :1] + np.arange(6) + t / 5) + noise
+    cells = np.repeat(six[..., [0, 1, 2, 1, 3, 4, 2, 4, 5]], 2, axis=1)
+    pressure = 101325 + np.sin(SHEET[:, 0] + t[..., 0] / 5)
+    pressure[3, 5] = np.nan
+    velocity = np.repeat(25 * np.gradient(positions.astype(np.float64), axis=0)[:, quads].mean(axis=2), 2, axis=1)
+    fields = {
+        "stress": gvpipe.Field(cells.astype(np.float32), "triangle"),
+        "far": gvpipe.Field(cells[..., :3] + 1e6, "triangle"),
+        "pressure": gvpipe.Field(pressure),
+        "velocity": gvpipe.Field(velocity.astype(np.float32), "triangle"),
+    }
+    sequence = gvpipe.MeshSequence(positions, faces, 24, fields=fields, polygons=counts)
+    gvpipe.encode(sequence, tmp_path / "a.mp4", "pca", fields={"velocity": "1%", "pressure": "0.1%,nan=keep"})
+    with Player(tmp_path / "a.mp4") as video:
+        job = Job(video.faces, video[:], video.polygons)
+        for listed in video.directory.fields:
+            assert listed.coding == REDUCED
+            values = video.fields[listed.name].read(0, len(video))
+            job.add(listed, video.bitstream.section(listed.section), values, [20, 0, 7, 3])
     assert job.run(tmp_path) == ""
 
 

@@ -18,7 +18,7 @@ from gvpipe.foundation.notes import not_held
 from gvpipe.io.alembic.archive import EXTRA
 from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
 from gvpipe.io.library.writing_process import write_by
-from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note
+from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note, wide_note
 from gvpipe.io.scene.export import ExportMesh, export_layer, export_meshes, uncovered
 from gvpipe.io.scene.normals import SceneNormals
 from gvpipe.model.sequence import MeshSequence
@@ -203,6 +203,7 @@ def _notes(sequence: MeshSequence, meshes: list[ExportMesh]) -> tuple[str, ...]:
     lost = uncovered(sequence, meshes)
     if lost:
         said.append(f"{lost} vertices belong to no part; Alembic holds meshes alone, so they were left out")
+    said += wide_note(sequence, "Alembic")
     if sequence.origin.any():
         said.append(f"Alembic holds float32 points; the origin {notes.show_origin(sequence.origin)} was added to them")
     about = sequence.metadata

@@ -21,6 +21,7 @@ from gvpipe.foundation.arrays import Array, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.fetching import is_elsewhere
+from gvpipe.io.frames.column_types import can_be_still, field_type
 from gvpipe.io.frames.frame_files import FrameFiles
 from gvpipe.io.left_behind import met_later
 from gvpipe.io.mesh import FrameValues, Mesh, too_wide
@@ -40,15 +41,16 @@ class Columns:
 
 
 class FrameColumn:
-    """One column of frame files, ``(F, R)`` or ``(F, R, C)``, loaded as it is sliced."""
+    """One column of frame files, ``(F, R)`` or ``(F, R, C)``, loaded as it is sliced, as numbers of a type."""
 
-    def __init__(self, frames: FrameFiles, name: str, first: Array) -> None:
+    def __init__(self, frames: FrameFiles, name: str, first: Array, dtype: np.dtype[Any]) -> None:
         self._frames, self._name = frames, name
         self.shape: tuple[int, ...] = (len(frames.paths), *first.shape)
-        self.dtype: Any = first.dtype
+        self.dtype: Any = dtype
 
     def __getitem__(self, key: slice, /) -> Array:
-        return self._frames.column(self._name, range(*key.indices(self.shape[0])))
+        with np.errstate(over="ignore"):
+            return self._frames.column(self._name, range(*key.indices(self.shape[0]))).astype(self.dtype, copy=False)
 
 
 def split_columns(frames: FrameFiles) -> Columns:
@@ -60,9 +62,9 @@ def split_columns(frames: FrameFiles) -> Columns:
     with reading(frames.paths[0], "", remedy=FRAME_AGAIN):
         given = {name: make() for name, make in frames.first.animated.items()}
     left = [name for name, one in given.items() if not one.can_be_held]
-    given = {name: one._replace(values=_narrow(one.values)) for name, one in given.items() if name not in left}
+    given = {name: one._replace(values=_plain(one.values)) for name, one in given.items() if name not in left}
     with reading(frames.paths[0], "", remedy=FRAME_AGAIN):
-        statics = {name: _static(frames.first, name, one) for name, one in given.items() if not _has_holes(one.values)}
+        statics = {name: _static(frames.first, name, one) for name, one in given.items() if can_be_still(one.values)}
     n_frames = len(frames.paths)
     samples = np.unique(np.linspace(1, n_frames - 1, SAMPLES).astype(int)).tolist() if n_frames > 1 else []
     moving = set(given) - set(statics)
@@ -90,11 +92,12 @@ def split_columns(frames: FrameFiles) -> Columns:
             moving |= found
     corners = {name for name in moving if given[name].domain == "corner"}
     where = frames.paths[0].parent
-    fields = {
-        name: Field(FrameColumn(frames, name, one.values), one.domain, one.kind, one.unit, name=f"{where}: field {name!r}")
-        for name, one in given.items()
-        if name in moving - corners
-    }
+    fields = {}
+    for name in (each for each in given if each in moving - corners):
+        one = given[name]
+        samples_of = [frames.values(mesh, name, k, one.values) for mesh, k in zip(meshes, samples, strict=True)]
+        column = FrameColumn(frames, name, one.values, field_type([one.values, *samples_of]))
+        fields[name] = Field(column, one.domain, one.kind, one.unit, name=f"{where}: field {name!r}")
     attributes = {name: each for name, each in statics.items() if name not in fields}
     notes = (FIRST_NORMALS,) if corners else ()
     more = met_later(frames.first.not_carried, (name for mesh in looked_at for name in mesh.not_carried))
@@ -117,9 +120,9 @@ def _keep(frames: FrameFiles, names: set[str], given: dict[str, FrameValues], n_
             frames.keep(name, given[name].values, n_frames)
 
 
-def _narrow(values: Array) -> Array:
+def _plain(values: Array) -> Array:
     """Numbers of a type that fields have."""
-    result = np.asarray(values, np.float32) if values.dtype.kind == "f" else values
+    result = values if values.dtype.kind != "f" or values.dtype.itemsize == 8 else np.asarray(values, np.float32)
     return result if result.dtype.isnative else result.astype(result.dtype.newbyteorder("="))
 
 
@@ -150,8 +153,3 @@ def _are_own(frames: FrameFiles, meshes: list[Mesh], numbers: list[int], normals
     ]
     rules = {own_rule(values[rows], mesh.positions, faces, entries) for mesh, values in pairs}
     return None not in rules
-
-
-def _has_holes(values: Array) -> bool:
-    """Whether numbers are missing: an attribute has none, a field may."""
-    return values.dtype.kind == "f" and not bool(np.isfinite(values).all())

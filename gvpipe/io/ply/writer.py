@@ -18,7 +18,7 @@ from gvpipe.asset.field import Field
 from gvpipe.asset.material import Material
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
 from gvpipe.foundation.arrays import Array, Float32, Int32, Int64
-from gvpipe.io.even_polygons import is_even
+from gvpipe.io.even_polygons import is_even, is_even_field
 from gvpipe.io.losses import lost_notes, renamed_note, shadow_note, shadowed
 from gvpipe.io.mesh import FrameEncoder
 from gvpipe.io.normals.of_frames import frame_normals, turned_note
@@ -43,7 +43,7 @@ class _Column(NamedTuple):
 def encode_ply(sequence: MeshSequence, shared: str) -> FrameEncoder:
     """An encoder of frames. Coordinates are ``double`` where they count from an origin."""
     columns = _columns(sequence)
-    polygons = sequence.polygons if sequence.polygons is not None and _are_even(columns, sequence.polygons) else None
+    polygons = sequence.polygons if sequence.polygons is not None and _are_even(columns, sequence, sequence.polygons) else None
     vertex = [(name, "<f8" if sequence.origin.any() else "<f4") for name in "xyz"]
     normals = frame_normals(sequence)
     normals = normals if normals is not None and normals.indices is None else None
@@ -115,10 +115,13 @@ def _kind(dtype: np.dtype[Any]) -> str:
     return f"{dtype.kind}{dtype.itemsize}"
 
 
-def _are_even(columns: dict[str, _Column], polygons: Int32) -> bool:
+def _are_even(columns: dict[str, _Column], sequence: MeshSequence, polygons: Int32) -> bool:
     """Whether all triangles of each polygon have the same numbers."""
-    triangles = [one.values for one in columns.values() if one.domain == "triangle"]
-    return all(values is not None and is_even(values, polygons) for values in triangles)
+    triangles = {name: one.values for name, one in columns.items() if one.domain == "triangle"}
+    return all(
+        is_even_field(sequence.fields[name], polygons) if values is None else is_even(values, polygons)
+        for name, values in triangles.items()
+    )
 
 
 def _fill(records: Array, columns: dict[str, _Column], domain: str, fields: Mapping[str, Array], rows: Int64 | None) -> None:

@@ -124,13 +124,12 @@ def field_data(name: str) -> str:
 
 
 def plain_numbers(values: Array) -> Array:
-    """Integers of 64 bits as 32 where they fit; numbers in the machine's byte order."""
+    """Integers of 64 bits as 32 where they fit; all in the machine's byte order."""
     values = values.astype(values.dtype.newbyteorder("="), copy=False)
     if values.dtype.kind == "b":
         return values.astype(np.uint8)
     if values.dtype.kind == "f":
-        with np.errstate(over="ignore"):
-            return values.astype(np.float32, copy=False)
+        return values
     if values.dtype.itemsize == 8:
         fits = values.size == 0 or (int(values.min()) >= -(1 << 31) and int(values.max()) < 1 << 31)
         return values.astype(np.int32) if fits else values

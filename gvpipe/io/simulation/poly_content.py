@@ -1,7 +1,7 @@
 """What VTK's poly data hold of a sequence: polygons, and numbers per point and per cell.
 
-A cell is a polygon. Numbers per triangle are those of a polygon's first triangle; where an attribute, or a field in the first
-frame, differs inside of polygons by more than 1 % of its range, triangles are written. Numbers per corner have no place.
+A cell is a polygon. Numbers per triangle are those of a polygon's first triangle; where an attribute or a field differs inside
+of polygons, triangles are written. Numbers per corner have no place.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset.polygons import polygon_corners, polygon_starts
 from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.io.even_polygons import is_even, is_even_field
 from gvpipe.io.losses import lost_notes, shadow_note, shadowed
 from gvpipe.model.sequence import MeshSequence
 
-SAME = 0.01  # part of the range by which values inside of a polygon may differ
 ROLES = {"normal": "Normals", "uv": "TCoords"}
 
 
@@ -66,9 +66,8 @@ def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = Fal
     attributes = {name: one for name, one in attributes.items() if name not in fields}
     polygons = sequence.polygons
     if polygons is not None:
-        per_triangle = [np.asarray(one) for one in attributes.values() if one.domain == "triangle"]
-        per_triangle += [one.read(0, 1)[0] for one in fields.values() if one.domain == "triangle"]
-        if not all(_is_same_inside(values, polygons.astype(np.int64)) for values in per_triangle):
+        still = all(is_even(np.asarray(one), polygons) for one in attributes.values() if one.domain == "triangle")
+        if not (still and all(is_even_field(one, polygons) for one in fields.values() if one.domain == "triangle")):
             polygons = None
     counts = np.full(len(sequence.faces), 3, np.int64) if polygons is None else polygons.astype(np.int64)
     flat = sequence.faces.reshape(-1)
@@ -83,12 +82,3 @@ def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = Fal
         fields,
         (*lost_notes(sequence, format_name, held), *twice),
     )
-
-
-def _is_same_inside(values: Array, counts: Int64) -> bool:
-    """Whether values ``(T, C)`` are the same in all triangles of each polygon, up to `SAME`."""
-    wide = values.astype(np.float64)
-    wide = np.where(np.isfinite(wide), wide, 0)
-    starts = np.repeat(polygon_starts(counts), counts - 2)
-    apart = np.abs(wide - wide[starts]).max(initial=0)
-    return bool(apart <= SAME * np.ptp(wide)) if wide.size else True

@@ -18,6 +18,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.foundation.arrays import Array, Float32, Float64, Floats
 from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.io.damage import reading
+from gvpipe.io.frames.column_types import can_be_still, field_type
 from gvpipe.io.mesh import FrameValues, too_wide
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
@@ -134,6 +135,8 @@ class StepColumn:
         self._frames, self._name = frames, name
         self.shape: tuple[int, ...] = (frames.shape[0], *first.shape)
         self.dtype: Any = first.dtype
+        if first.dtype == np.float64:
+            self.dtype = field_type([first, *(frames.column(name, frame).values for frame in _samples(frames))])
 
     def __getitem__(self, key: slice, /) -> Array:
         frames = range(*key.indices(self.shape[0]))
@@ -142,7 +145,8 @@ class StepColumn:
             values = self._frames.column(self._name, frame).values
             if values.shape != self.shape[1:]:
                 raise InputError(f"{self._name!r} is {values.shape} in frame {frame} and {self.shape[1:]} in the first")
-            block[i] = values
+            with np.errstate(over="ignore"):
+                block[i] = values
         return block
 
 
@@ -221,9 +225,14 @@ def _late_names(frames: StepFrames) -> list[str]:
 
 def _is_still(frames: StepFrames, name: str, first: Array) -> bool:
     """Whether numbers are finite and the same in all frames."""
-    if first.dtype.kind == "f" and not np.isfinite(first).all():
-        return False  # an attribute has no holes, a field may
-    n_frames = frames.shape[0]
-    samples = np.unique(np.linspace(1, n_frames - 1, SAMPLES).astype(int)).tolist() if n_frames > 1 else []
-    rest = (frame for frame in range(1, n_frames) if frame not in samples)
+    if not can_be_still(first):
+        return False
+    samples = _samples(frames)
+    rest = (frame for frame in range(1, frames.shape[0]) if frame not in samples)
     return all(np.array_equal(frames.column(name, frame).values, first) for frame in (*samples, *rest))
+
+
+def _samples(frames: StepFrames) -> list[int]:
+    """Some frames behind the first."""
+    n_frames = frames.shape[0]
+    return np.unique(np.linspace(1, n_frames - 1, SAMPLES).astype(int)).tolist() if n_frames > 1 else []

@@ -18,7 +18,7 @@ from gvpipe.foundation.arrays import Float32
 from gvpipe.foundation.atomic import atomic_path, temporary_folder, unnamed_path
 from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.io.damage import reason_of
-from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS, renamed_note, shadow_note, shadowed, unit_note
+from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS, renamed_note, shadow_note, shadowed, unit_note, wide_note
 from gvpipe.io.scene.export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene.normals import SceneNormals
 from gvpipe.io.usd.material_writer import MaterialWriter
@@ -290,6 +290,7 @@ def _notes(sequence: MeshSequence, meshes: list[ExportMesh], has_skin: bool) -> 
     lost = uncovered(sequence, meshes)
     if lost:
         said.append(f"{lost} vertices belong to no part; USD holds meshes alone, so they were left out")
+    said += wide_note(sequence, "USD")
     if sequence.origin.any() and not has_skin:
         said.append(f"USD holds float32 points; the origin {notes.show_origin(sequence.origin)} was added to them")
     if sequence.metadata.up_axis == "x":

@@ -7,6 +7,7 @@ export const DIRECTORY_MOST = 65536;
 export const DIRECTORY_MAX_BYTES = 67108864;
 export const DIRECTORY_SURFACE = 2;
 export const DIRECTORY_OCTAHEDRAL = 3;
+export const DIRECTORY_REDUCED = 4;
 
 // gvpipe.asset_coding.encoder
 export const ENCODER_ARRANGEMENT = "arrangement";

@@ -9,6 +9,7 @@ import {
   DIRECTORY_SECTION as SECTION,
   DIRECTORY_SURFACE as SURFACE,
   DIRECTORY_OCTAHEDRAL as OCTAHEDRAL,
+  DIRECTORY_REDUCED as REDUCED,
   DIRECTORY_VERSION as VERSION,
   ENCODER_ARRANGEMENT as ARRANGEMENT,
   ENCODER_CODED as CODED,
@@ -21,6 +22,7 @@ import { inflate } from "../format/inflate.js";
 import { CodedField } from "../fields/coded_field.js";
 import { FieldHost } from "../fields/field_host.js";
 import { TYPES } from "../fields/head.js";
+import { readReduction } from "../fields/reduction.js";
 import { Kernels } from "../wasm/kernels.js";
 import { kernelCode } from "../wasm/inflated.js";
 import { AssetEntry } from "./asset_entry.js";
@@ -67,9 +69,9 @@ export async function readAsset(payload, video, positions) {
   const { parts, indices, polygons } = readParts(kernels, list, payload, video, materials.length);
   const first = list.flag("geometry", false) ? await video.frame(0) : null;
   const attributes = readAttributes(list, payload, new Surface(kernels, indices, video.vertexCount, first, parts.length), notes);
-  const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, positions);
+  const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, polygons, positions);
   const { frameCount, vertexCount, triangleCount } = video;
-  const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, host }, notes);
+  const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, polygons, host }, notes);
   const metadata = list.given.metadata ?? {};
   const close = () => host.close();
   return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
@@ -145,7 +147,7 @@ function readAttributes(list, payload, surface, notes) {
   return attributes;
 }
 
-function readFields(list, payload, { frameCount, vertexCount, triangleCount, host }, notes) {
+function readFields(list, payload, { frameCount, vertexCount, triangleCount, polygons, host }, notes) {
   const fields = new Map();
   const names = new Set();
   for (const given of list.list("fields", MAX_ITEMS)) {
@@ -172,7 +174,10 @@ function readFields(list, payload, { frameCount, vertexCount, triangleCount, hos
     };
     const rows = checked.domain === "vertex" ? vertexCount : triangleCount;
     const fullScale = FULL_SCALES[checked.type] ?? 1;
-    fields.set(name, new CodedField({ ...checked, fullScale }, coding === OCTAHEDRAL, frameCount, rows, host, payload));
+    const member = coding === REDUCED ? new AssetEntry(given.reduced, `field ${name}`) : null;
+    const reduction = readReduction(member, checked.components || 1, checked.domain, polygons);
+    const shape = { frameCount, rowCount: rows, isOctahedral: coding === OCTAHEDRAL, reduction };
+    fields.set(name, new CodedField({ ...checked, fullScale }, shape, host, payload));
   }
   return fields;
 }
@@ -180,6 +185,6 @@ function readFields(list, payload, { frameCount, vertexCount, triangleCount, hos
 /** Why a field cannot be read; "" if it can. */
 function obstacle(coding, { kind, components }) {
   if (coding === SURFACE) return "it follows from the surface, as the player's own normals do";
-  const isKnown = coding === CODED || (coding === OCTAHEDRAL && kind === "normal" && components === 3);
+  const isKnown = coding === CODED || coding === REDUCED || (coding === OCTAHEDRAL && kind === "normal" && components === 3);
   return isKnown ? "" : "a newer gvpipe wrote it";
 }

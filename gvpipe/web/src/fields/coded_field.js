@@ -3,6 +3,7 @@
 import { corrupt } from "../format/errors.js";
 import { readHead } from "./head.js";
 import { fromOctahedral } from "./octahedral.js";
+import { restored } from "./reduction.js";
 
 const KEPT_BYTES = 64 * 2 ** 20; // of decoded segments
 const KEPT_SEGMENTS = 2; // at least: the one shown and the next
@@ -13,20 +14,24 @@ export class CodedField {
   #fetch;
   #host;
   #isOctahedral;
+  #reduction;
   #segments = new Map(); // number -> values (n, R, C), the one used last at the end
   #loading = new Map(); // number -> promise
 
   /**
-   * @param {object} entry of section `asset`, checked @param {boolean} isOctahedral whether its vectors are coded as two coordinates
-   * @param {number} frameCount F @param {number} rowCount R
+   * @param {object} entry of section `asset`, checked
+   * @param {{frameCount: number, rowCount: number, isOctahedral: boolean, reduction: import("./reduction.js").Reduction}} shape F, R,
+   *   whether its vectors are coded as two coordinates, and what of it is coded once
    * @param {import("./field_host.js").FieldHost} host @param {import("../format/payload.js").Payload} payload with its section, or to load it from
    */
-  constructor(entry, isOctahedral, frameCount, rowCount, host, payload) {
+  constructor(entry, { frameCount, rowCount, isOctahedral, reduction }, host, payload) {
     this.name = entry.name;
     this.kind = entry.kind;
     this.domain = entry.domain;
     this.unit = entry.unit;
-    this.type = entry.type;
+    /** Of the values: `float64` where they have an offset. */
+    this.type = reduction.offsets ? "float64" : entry.type;
+    this.codedType = entry.type;
     this.components = entry.components || 1;
     this.frameCount = frameCount;
     this.rowCount = rowCount;
@@ -41,6 +46,7 @@ export class CodedField {
     this.largest = 0;
     this.#host = host;
     this.#isOctahedral = isOctahedral;
+    this.#reduction = reduction;
     this.#fetch = payload.late.get(entry.section);
     if (!this.#fetch) this.#take(payload.section(entry.section));
   }
@@ -86,8 +92,8 @@ export class CodedField {
   }
 
   #take(data) {
-    const head = readHead(data, this.frameCount, this.rowCount, this.section);
-    if (head.components !== (this.#isOctahedral ? 2 : this.components) || head.type !== this.type) {
+    const head = readHead(data, this.frameCount, this.#reduction.polygons?.length ?? this.rowCount, this.section);
+    if (head.components !== (this.#isOctahedral ? 2 : this.#reduction.components) || head.type !== this.codedType) {
       throw corrupt(this.section, "it does not hold what section 'asset' lists");
     }
     this.#head = head;
@@ -119,10 +125,11 @@ export class CodedField {
   async #decode(number) {
     const { segments, bounds, components, type } = this.#head;
     const [start, stop] = [bounds[number], bounds[number + 1]];
-    const { frameCount, domain, section } = this;
+    const { frameCount, section } = this;
+    const domain = this.#reduction.polygons ? "polygon" : this.domain;
     const job = { data: segments[number].slice(), start, stop, frameCount, components, type, domain, name: section };
     const decoded = await this.#host.decode(job);
-    const values = this.#isOctahedral ? fromOctahedral(decoded) : decoded;
+    const values = this.#isOctahedral ? fromOctahedral(decoded) : restored(decoded, this.#reduction);
     if (this.components > 1) this.largest = Math.max(this.largest, longest(values, this.components));
     this.#segments.set(number, values);
     for (const old of this.#segments.keys()) {

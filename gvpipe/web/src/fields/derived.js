@@ -5,7 +5,8 @@ import { DERIVED_MAGNITUDE as MAGNITUDE, DERIVED_SIGNALS as SIGNALS } from "../c
 /**
  * @typedef {object} Span the motion of a segment's frames
  * @property {number} start the segment's first frame @property {number} frameCount F of the sequence
- * @property {Int32Array|null} faces (3T) of rows that are triangles; null: rows are vertices
+ * @property {Int32Array|null} faces (3T) of rows that are triangles or polygons; null: rows are vertices
+ * @property {Int32Array|null} polygons corners of each, of rows that are polygons
  * @property {(frame: number) => Promise<Float32Array>} positions (V, 3) decoded
  *
  * @param {import("../format/cursor.js").Cursor} cursor @param {number} components @param {number} frameCount F
@@ -51,25 +52,40 @@ export async function derivedValues({ kind, reference, coefficients }, frames, s
 }
 
 /** A function that gives rows' positions (R, 3) in a frame; it keeps those that are asked for again. */
-function rowsOf({ faces, positions }) {
+function rowsOf({ faces, polygons, positions }) {
   const kept = new Map();
   return async (frame) => {
     if (!kept.has(frame)) {
       const points = await positions(frame);
       if (kept.size > 3) kept.delete(Math.min(...kept.keys()));
-      kept.set(frame, faces ? middles(points, faces) : points);
+      kept.set(frame, faces ? middles(points, faces, polygons) : points);
     }
     return kept.get(frame);
   };
 }
 
-function middles(points, faces) {
+function middles(points, faces, polygons) {
   const result = new Float64Array(faces.length);
   for (let t = 0; t < faces.length; t += 3) {
     for (let axis = 0; axis < 3; axis++) {
       result[t + axis] = (points[3 * faces[t] + axis] + points[3 * faces[t + 1] + axis] + points[3 * faces[t + 2] + axis]) / 3;
     }
   }
+  return polygons ? means(result, polygons) : result;
+}
+
+/** The mean of the triangles of each polygon. */
+function means(points, polygons) {
+  const result = new Float64Array(3 * polygons.length);
+  let from = 0;
+  polygons.forEach((corners, p) => {
+    for (let axis = 0; axis < 3; axis++) {
+      let sum = 0;
+      for (let k = 0; k < corners - 2; k++) sum += points[from + 3 * k + axis];
+      result[3 * p + axis] = sum / (corners - 2);
+    }
+    from += 3 * (corners - 2);
+  });
   return result;
 }
 

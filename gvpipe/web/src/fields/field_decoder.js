@@ -9,11 +9,15 @@ import { decodeSegment } from "./segment.js";
 export class FieldDecoder {
   #orders = {}; // by domain, promises
 
-  /** @param {Uint8Array} code of kernels @param {Int32Array} faces (3T) @param {number} vertexCount */
-  constructor(code, faces, vertexCount) {
+  /**
+   * @param {{code: Uint8Array, faces: Int32Array, vertexCount: number, polygons: Int32Array|null}} mesh the code of kernels, (3T)
+   *   triangles, and corners of each polygon
+   */
+  constructor({ code, faces, vertexCount, polygons }) {
     this.code = code;
     this.faces = faces;
     this.vertexCount = vertexCount;
+    this.polygons = polygons;
   }
 
   /**
@@ -27,7 +31,8 @@ export class FieldDecoder {
     try {
       const order = await (this.#orders[domain] ??= this.#findOrder(domain));
       const kernels = await Kernels.open(this.code);
-      const span = { start, frameCount, faces: domain === "triangle" ? this.faces : null, positions };
+      const [faces, polygons] = [domain === "vertex" ? null : this.faces, domain === "polygon" ? this.polygons : null];
+      const span = { start, frameCount, faces, polygons, positions };
       const shape = [stop - start, order.order.length, components];
       return await decodeSegment(data, shape, type, { kernels, causal: placed(kernels, order), name, span });
     } catch (error) {
@@ -37,6 +42,6 @@ export class FieldDecoder {
   }
 
   async #findOrder(domain) {
-    return rowOrder(await Kernels.open(this.code), this.faces, this.vertexCount, domain);
+    return rowOrder(await Kernels.open(this.code), this.faces, this.vertexCount, domain, this.polygons);
   }
 }

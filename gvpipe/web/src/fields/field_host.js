@@ -13,10 +13,11 @@ export class FieldHost {
 
   /**
    * @param {Uint8Array} code of kernels @param {Int32Array} faces (3T) @param {number} vertexCount
+   * @param {Int32Array|null} polygons corners of each, if not all are triangles
    * @param {(frame: number) => Promise<Float32Array>} positions (V, 3) decoded
    */
-  constructor(code, faces, vertexCount, positions) {
-    this.mesh = { task: "fields", code, faces, vertexCount };
+  constructor(code, faces, vertexCount, polygons, positions) {
+    this.mesh = { task: "fields", code, faces, vertexCount, polygons };
     this.positions = positions;
   }
 
@@ -51,7 +52,7 @@ export class FieldHost {
   #goOnHere() {
     this.#worker?.terminate();
     this.#worker = null;
-    this.#decoder = new FieldDecoder(this.mesh.code, this.mesh.faces, this.mesh.vertexCount);
+    this.#decoder = new FieldDecoder(this.mesh);
     for (const { job, resolve, reject } of this.#jobs.values()) this.decode(job).then(resolve, reject);
     this.#jobs.clear();
   }

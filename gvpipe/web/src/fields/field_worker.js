@@ -4,8 +4,8 @@ import { FieldDecoder } from "./field_decoder.js";
 import { known } from "./field_host.js";
 
 /** @returns {(message: object) => void} what takes the messages after the first, which is the mesh */
-export function serveFields({ code, faces, vertexCount }) {
-  const decoder = new FieldDecoder(code, faces, vertexCount);
+export function serveFields(mesh) {
+  const decoder = new FieldDecoder(mesh);
   const waiting = new Map(); // "number frame" -> what to call with its positions
   return ({ number, job, frame, positions }) => {
     if (job) {

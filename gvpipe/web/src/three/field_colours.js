@@ -30,7 +30,8 @@ export class FieldColours {
     this.field = field;
     this.rows = rows;
     this.table = table;
-    this.values = new Float32Array(field.rowCount * field.components);
+    const Values = field.type === "float64" ? Float64Array : Float32Array;
+    this.values = new Values(field.rowCount * field.components);
     this.isColour = field.kind === "color";
     /** Of the geometry's attribute: vertex colours, or coordinates in the texture. */
     this.name = this.isColour || table ? "color" : UV_NAME;
