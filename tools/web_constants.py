@@ -20,6 +20,7 @@ TARGET = Path(__file__).parents[1] / "gvpipe" / "web" / "src" / "constants.js"
 SHARED = {
     "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL REDUCED",
     "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
+    "gvpipe.asset_coding.times": "SECTION",
     "gvpipe.attributes.linear_kernels": "AFFINE PARALLELOGRAM",
     "gvpipe.attributes.match_kernels": "N_MATCH_CONTEXTS N_RESIDUAL_CONTEXTS",
     "gvpipe.attributes.octahedral_kernels": "MEAN PLACE PLACE_CORRECTED SURFACE",

@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from gvpipe.asset.attribute import check_word
+from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.errors import InputError
 
 UP_AXES = ("", "x", "y", "z")
-TIMES = "times"  # name of a text: the times of all frames, seconds, where they do not follow from start and rate
 NOT_CARRIED = "not carried"  # name of a text: what the source had beside what its file carries
 SEPARATOR = "; "
 
@@ -25,6 +27,8 @@ class Metadata:
         start_time: of frame 0, seconds.
         source: name of the program or file that it came from.
         texts: anything else, by name.
+        times: of each frame, seconds, where they do not follow from the start and the rate, as those of a simulation may not; a
+            sequence with another number of frames has none.
     """
 
     up_axis: str = ""
@@ -32,6 +36,7 @@ class Metadata:
     start_time: float = 0.0
     source: str = ""
     texts: Mapping[str, str] = field(default_factory=dict)
+    times: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check_word("up axis", self.up_axis, UP_AXES, "metadata")
@@ -42,19 +47,22 @@ class Metadata:
             raise InputError(f"metadata: the start time is {self.start_time}; seconds are needed")
         if not all(isinstance(key, str) and isinstance(text, str) for key, text in self.texts.items()):
             raise InputError("metadata: texts are not all texts by name; make texts of them")
+        object.__setattr__(self, "times", tuple(float(time) for time in self.times))
+        if not np.isfinite(self.times).all():
+            frame = int(np.flatnonzero(~np.isfinite(self.times))[0])
+            raise InputError(f"metadata: the time of frame {frame} is {self.times[frame]}; seconds are needed")
+
+    def frame_times(self, n_frames: int, fps: float) -> Float64:
+        """``(F,)`` seconds of the frames: the times where there are so many, else by start and rate."""
+        if len(self.times) == n_frames:
+            return np.array(self.times)
+        return np.asarray(self.start_time + np.arange(n_frames) / fps)
 
     def of_frames(self, start: int, stop: int, n_frames: int) -> Metadata:
         """The metadata of frames ``start`` to ``stop`` of ``n_frames``: with their times, where each has one of its own."""
-        words = self.texts.get(TIMES, "").split()[: n_frames + 1]
-        if len(words) != n_frames or (start, stop) == (0, n_frames) or not 0 <= start < stop <= n_frames:
+        if len(self.times) != n_frames or (start, stop) == (0, n_frames) or not 0 <= start < stop <= n_frames:
             return self
-        try:
-            first = float(words[start])
-        except ValueError:  # a text of that name, of something else
-            return self
-        if not math.isfinite(first):
-            return self
-        return replace(self, start_time=first, texts={**self.texts, TIMES: " ".join(words[start:stop])})
+        return replace(self, start_time=self.times[start], times=self.times[start:stop])
 
 
 NO_METADATA = Metadata()

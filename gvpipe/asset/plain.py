@@ -83,6 +83,8 @@ def _typed(hint: Any, value: Any, where: str) -> Any:
     if is_dataclass(hint):
         return from_plain(typing.cast(type[Any], hint), value, where)
     if origin is tuple:
+        if inner[-1] is Ellipsis and isinstance(value, list):
+            inner = (inner[0],) * len(value)
         if not isinstance(value, list) or len(value) != len(inner):
             raise InputError(f"{where} is {_short(value)}; {len(inner)} values are needed")
         return tuple(_typed(one, each, where) for one, each in zip(inner, value, strict=True))

@@ -24,6 +24,8 @@ from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.asset_coding.reduction import Reduction, read_reduction
+from gvpipe.asset_coding.times import SECTION as TIMES
+from gvpipe.asset_coding.times import unpack_times
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.json_object import JsonObject, pack_json, unpack_json
 from gvpipe.foundation.arrays import Int64
@@ -159,10 +161,14 @@ def unpack_directory(data: bytes, n_vertices: int, budget: Budget = UNLIMITED) -
 
 
 def read_directory(bitstream: Bitstream) -> Directory:
-    """The directory of a bitstream, empty if it has positions alone; raises `CorruptFile`, `OverBudget`."""
+    """The directory of a bitstream, and the times of its frames; raises `CorruptFile`, `OverBudget`."""
     if SECTION not in bitstream.sections:
         return Directory()
-    return unpack_directory(bitstream.section(SECTION), bitstream.n_vertices, bitstream.budget)
+    directory = unpack_directory(bitstream.section(SECTION), bitstream.n_vertices, bitstream.budget)
+    if TIMES not in bitstream.sections or directory.version > VERSION:
+        return directory
+    times = unpack_times(bitstream.section(TIMES), bitstream.n_frames, bitstream.budget)
+    return dataclasses.replace(directory, metadata=dataclasses.replace(directory.metadata, times=times))
 
 
 def read_images(directory: Directory, bitstream: Bitstream) -> tuple[Image, ...]:

@@ -38,6 +38,8 @@ from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.reduction import NO_REDUCTION, Reduction
 from gvpipe.asset_coding.scan import WHOLE_KINDS, Scan, are_whole, longest_vector, scan_field
+from gvpipe.asset_coding.times import SECTION as TIMES
+from gvpipe.asset_coding.times import pack_times
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
@@ -170,6 +172,9 @@ class AssetCoder:
         origins = Origins(permutation, sources.corners, sources.triangles)
         attributes = self._add_attributes(sections, origins, surface)
         fields = self._add_fields(sections, origins, surface, arrangement.polygons, reader if is_final else None)
+        metadata = _with_losses(self._sequence)
+        if len(metadata.times) == encoded.bitstream.n_frames:
+            sections[TIMES] = pack_times(metadata.times)
         images = []
         for number, image in enumerate(self.plan.images):
             images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
@@ -181,7 +186,7 @@ class AssetCoder:
             fields=fields,
             materials=self._sequence.materials,
             images=tuple(images),
-            metadata=_with_losses(self._sequence),
+            metadata=dataclasses.replace(metadata, times=()),
         )
         return dataclasses.replace(
             encoded.bitstream,

@@ -37,7 +37,11 @@ def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
     for image in info.images:
         size = "x".join(map(str, image["size"])) if image["size"] else "size unknown"
         yield f"image {image['name']}: {image['media_type']}, {size}, {image['bytes']} bytes"
-    said = {key: value for key, value in info.metadata.items() if value and key != "texts"} | info.metadata["texts"]
+    about = dict(info.metadata)
+    times, texts = about.pop("times"), about.pop("texts")
+    said = {key: value for key, value in about.items() if value} | texts
+    if times:
+        yield f"times: {times[0]:.9g}..{times[-1]:.9g} s, one for each frame"
     if said:
         yield "metadata: " + ", ".join(f"{key} {value}" for key, value in said.items())
 

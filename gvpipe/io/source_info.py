@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import os
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from gvpipe.asset.listing import Things, count_polygons, list_things
-from gvpipe.asset.metadata import TIMES
 from gvpipe.foundation.arguments import StrPath
 from gvpipe.io import read
 from gvpipe.io.clips import list_clips
@@ -99,12 +95,8 @@ def source_info(
 
 def _time_range(sequence: MeshSequence) -> list[float]:
     """Seconds of the first and the last frame, by the file's own times where its steps are uneven."""
-    start, listed = sequence.metadata.start_time, sequence.metadata.texts.get(TIMES, "").split()
-    with contextlib.suppress(ValueError):  # a text of that name may hold anything
-        times = [float(time) for time in listed]
-        if len(times) == sequence.n_frames and np.isfinite(times).all():
-            return [times[0], times[-1]]
-    return [start, start + (sequence.n_frames - 1) / sequence.fps]
+    times = sequence.times
+    return [float(times[0]), float(times[-1])]
 
 
 def _attributes(sequence: MeshSequence) -> list[dict[str, Any]]:

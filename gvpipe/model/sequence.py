@@ -256,6 +256,11 @@ class MeshSequence:
         """The largest rounding of a coordinate to float32, model units; of frames that load later, those that have loaded."""
         return max(self._rounding, float(getattr(self.positions, "rounding", 0.0)))
 
+    @property
+    def times(self) -> Float64:
+        """``(F,) float64`` seconds of the frames: those that `metadata` tells, else by the rate."""
+        return self.metadata.frame_times(self.n_frames, self.fps)
+
     def reordered(self, permutation: Integers, faces: Int32) -> MeshSequence:
         """Return the sequence whose vertex i is this one's vertex ``permutation[i]``; frames still load when read.
 

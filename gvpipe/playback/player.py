@@ -118,6 +118,11 @@ class Player:
         return self._asset.metadata
 
     @property
+    def times(self) -> Float64:
+        """``(F,) float64`` seconds of the frames, as `MeshSequence.times`."""
+        return self.metadata.frame_times(len(self), self.fps)
+
+    @property
     def directory(self) -> Directory:
         """Section ``asset`` of the file."""
         return self._asset.directory

@@ -24,6 +24,7 @@ from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.rendering.field_map import FieldMap, Range
+from gvpipe.rendering.legend import widen_for_time, write_time
 from gvpipe.rendering.picture_files import STILL, WRITERS
 from gvpipe.runtime.forks import kept
 
@@ -99,7 +100,13 @@ class Film:
         frame = self.frames[k]
         values = self.shown.values(frame) if self.shown else None
         picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
-        return picture if self.legend is None else np.concatenate([self.legend, picture], axis=1)
+        if self.legend is None:
+            return picture
+        legend = self.legend
+        if self.sequence.metadata.times:
+            height, across, _ = picture.shape
+            legend = write_time(legend, (across + legend.shape[1], height), self.sequence.times[frame])
+        return np.concatenate([legend, picture], axis=1)
 
 
 @dataclass(frozen=True)
@@ -209,6 +216,8 @@ def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, referenc
         colors = options.colormap or DEFAULT_COLORMAP
         shown = FieldMap(sequence, options.field, frames, colors, options.limits)
     legend = shown.legend(options.size) if shown else None
+    if legend is not None and sequence.metadata.times:
+        legend = widen_for_time(legend, options.size)
     across -= 0 if legend is None else legend.shape[1]
     up = options.up or sequence.metadata.up_axis or "y"
     camera = options.camera or framing(

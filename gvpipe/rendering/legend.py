@@ -14,6 +14,7 @@ from gvpipe.rasterizer.colours import BACKGROUND
 SMALLEST = (160, 120)  # pixels, of a picture with a legend
 INK = (60, 60, 60)
 MOST_TICKS = 6
+WIDEST_TIME = "t = -1.23457e-05 s"
 LONGEST_TITLE = 24  # characters of a line
 
 
@@ -31,9 +32,9 @@ def paint_legend(size: tuple[int, int], titles: Sequence[str], ticks: Mapping[fl
     from PIL import Image, ImageDraw, ImageFont
 
     width, height = size
+    text = _text_height(size)
     if width < SMALLEST[0] or height < SMALLEST[1]:
         raise InputError(f"a picture of {width}x{height}; with a legend, {SMALLEST[0]}x{SMALLEST[1]} pixels are the least")
-    text = max(9, min(height // 28, width // 38))  # pixels
     font = ImageFont.load_default(text)
     lines = [title if len(title) <= LONGEST_TITLE else title[: LONGEST_TITLE - 1] + "…" for title in titles]
     bar = 8 * text  # pixels, its length
@@ -50,6 +51,31 @@ def paint_legend(size: tuple[int, int], titles: Sequence[str], ticks: Mapping[fl
     for part, label in ticks.items():
         draw.text((2.6 * text, top + (1 - part) * (bar - 1)), label, fill=INK, font=font, anchor="lm")
     return np.asarray(image)
+
+
+def widen_for_time(legend: UInt8, size: tuple[int, int]) -> UInt8:
+    """Return a legend ``(H, w, 3)`` with room for what `write_time` writes; ``size`` as for `paint_legend`."""
+    from PIL import ImageFont
+
+    text = _text_height(size)
+    width = math.ceil(ImageFont.load_default(text).getlength(WIDEST_TIME)) + 2 * text
+    room = np.broadcast_to(legend[:, :1], (len(legend), max(width - legend.shape[1], 0), 3))
+    return np.concatenate([legend, room], axis=1)
+
+
+def write_time(legend: UInt8, size: tuple[int, int], time: float) -> UInt8:
+    """Return a legend that `widen_for_time` made with a time, seconds, at its top."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    text = _text_height(size)
+    image = Image.fromarray(legend)
+    ImageDraw.Draw(image).text((text, text), f"t = {time:.6g} s", fill=INK, font=ImageFont.load_default(text))
+    return np.asarray(image)
+
+
+def _text_height(size: tuple[int, int]) -> int:
+    """Pixels."""
+    return max(9, min(size[1] // 28, size[0] // 38))
 
 
 def round_ticks(low: float, high: float) -> dict[float, str]:

@@ -41,7 +41,7 @@ def timed(sequence: MeshSequence, paths: Sequence[Path], fps: float | None, real
     return replace(
         sequence.with_fps(timing.fps),
         notes=(*(note for note in sequence.notes if note != ASSUMED_FPS), *timing.notes),
-        metadata=replace(metadata, start_time=timing.start, texts={**metadata.texts, **timing.texts}),
+        metadata=replace(metadata, start_time=timing.start, times=timing.times),
         not_carried=tuple(name for name in sequence.not_carried if name not in TOLD),
     )
 

@@ -76,7 +76,7 @@ def read_listed(
     frames = FrameFiles(files, start)
     first, columns = frames.first, split_columns(frames)
     timing = time_steps(times, len(files), options.fps, options.real_time)
-    metadata = replace(first.metadata, start_time=timing.start, source=path.name, texts=timing.texts)
+    metadata = replace(first.metadata, start_time=timing.start, source=path.name, times=timing.times)
     return MeshSequence(
         frames,
         first.faces,

@@ -182,7 +182,7 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
         fields,
         block_parts(frames.first, frames.surface),
         frames.surface.polygons,
-        metadata=Metadata(up, None, timing.start, path.name, timing.texts),
+        metadata=Metadata(up, None, timing.start, path.name, times=timing.times),
         not_carried=(*frames.first.not_carried, *frames.surface.not_carried, *too_wide(left), *_late_names(frames)),
     )
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvpipe.asset.metadata import TIMES
 from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS
 
@@ -24,13 +23,13 @@ class Timing:
     Args:
         fps: frames per second.
         start: time of the first frame, seconds.
-        texts: the times that do not follow from the rate, for `gvpipe.Metadata.texts`: each with all its digits.
+        times: of each frame, where they do not follow from the rate, for `gvpipe.Metadata.times`.
         notes: a line each.
     """
 
     fps: float
     start: float
-    texts: dict[str, str]
+    times: tuple[float, ...]
     notes: tuple[str, ...]
 
 
@@ -44,29 +43,27 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None, real_tim
         real_time: whether the rate is that of the steps, however fast or slow.
     """
     if times is None:
-        return Timing(fps or DEFAULT_FPS, 0.0, {}, () if fps or n_frames < 2 else (ASSUMED_FPS,))
+        return Timing(fps or DEFAULT_FPS, 0.0, (), () if fps or n_frames < 2 else (ASSUMED_FPS,))
     if not np.isfinite(times).all():
         bad = int(np.flatnonzero(~np.isfinite(times))[0])
         rate = fps or DEFAULT_FPS
         return Timing(
-            rate, 0.0, {}, (f"the time of frame {bad} is {times[bad]}; all are left out, {rate:g} a second are shown",)
+            rate, 0.0, (), (f"the time of frame {bad} is {times[bad]}; all are left out, {rate:g} a second are shown",)
         )
     start = float(times[0])
     if n_frames < 2:
-        return Timing(fps or DEFAULT_FPS, start, {}, ())
+        return Timing(fps or DEFAULT_FPS, start, (), ())
     steps = np.diff(times)
     mean = float(times[-1] - start) / (n_frames - 1)
-    texts = {TIMES: " ".join(repr(time).removesuffix(".0") for time in times.tolist())}
+    exact = tuple(times.tolist())
     if not (steps > 0).all() or not SLOWEST <= 1 / mean <= FASTEST:
         why = "do not rise" if not (steps > 0).all() else f"are {mean:.3g} s apart"
         rate = fps or (WATCHED if (steps > 0).all() and not real_time else DEFAULT_FPS)
-        return Timing(
-            rate, start, texts, (f"the steps' times {why}; frames are {rate:g} a second, the times are kept as text",)
-        )
+        return Timing(rate, start, exact, (f"the steps' times {why}; frames are {rate:g} a second, the times are kept",))
     is_shown = real_time or SLOWEST_SHOWN <= 1 / mean <= FASTEST_SHOWN
     rate = fps or (_whole(1 / mean) if is_shown else WATCHED)
     follow = np.allclose(start + np.arange(n_frames) / rate, times, rtol=ROUNDING, atol=ROUNDING * mean)
-    kept = {} if follow else texts
+    kept = () if follow else exact
     if fps is None and not is_shown:
         watched = (
             f"steps are {mean:.3g} s apart, so that {n_frames} frames are shown at {rate:g} a second; the times are kept "
@@ -76,7 +73,7 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None, real_tim
     is_even = bool((np.abs(steps - mean) <= EVEN * mean).all())
     said = () if is_even else (
         f"time steps are uneven, {steps.min():.3g} to {steps.max():.3g} s; frames are {rate:.6g} a second, "
-        "the times are kept as text",
+        "the times are kept",
     )  # fmt: skip
     return Timing(rate, start, kept, said)
 

@@ -16,7 +16,6 @@ from gvpipe.io.library.writing_process import write_by
 from gvpipe.io.losses import renamed_note
 from gvpipe.io.simulation.hdf import import_h5py
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
-from gvpipe.io.simulation.pvd_writer import frame_times
 from gvpipe.io.simulation.vtkhdf import POLY_GROUPS, ROOT, UNIT
 from gvpipe.model.sequence import MeshSequence
 
@@ -69,7 +68,7 @@ def _write_steps(root: Any, sequence: MeshSequence, content: PolyContent) -> Non
     frames: Int64 = np.arange(n_frames)
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = np.int64(n_frames)
-    steps["Values"] = frame_times(sequence)
+    steps["Values"] = sequence.times
     steps["PartOffsets"] = np.zeros(n_frames, np.int64)
     steps["NumberOfParts"] = np.ones(n_frames, np.int64)
     steps["PointOffsets"] = frames * sequence.n_vertices

@@ -13,6 +13,9 @@ export const DIRECTORY_REDUCED = 4;
 export const ENCODER_ARRANGEMENT = "arrangement";
 export const ENCODER_CODED = 1;
 
+// gvpipe.asset_coding.times
+export const TIMES_SECTION = "times";
+
 // gvpipe.attributes.linear_kernels
 export const LINEAR_KERNELS_AFFINE = 4;
 export const LINEAR_KERNELS_PARALLELOGRAM = 2;

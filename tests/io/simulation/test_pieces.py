@@ -76,7 +76,7 @@ def test_files_tell_their_times(tmp_path: Path) -> None:
     for step in range(3):
         piece(tmp_path / f"s{step}.vtu", step, list(range(8)), time=whole.format(3 + step / 4))
     found = gvpipe.read(tmp_path)
-    assert found.fps == 4 and found.metadata.start_time == 3 and "times" not in found.metadata.texts
+    assert found.fps == 4 and found.metadata.start_time == 3 and not found.metadata.times
     assert gvpipe.read(tmp_path, fps=8).fps == 8
     piece(tmp_path / "s3.vtu", 3, list(range(8)))
     assert gvpipe.read(tmp_path).fps == 30  # one that tells none
@@ -105,7 +105,7 @@ def test_rates_that_a_person_can_watch() -> None:
     times = frames * 5.0058e-5 + 0.1
     shown = time_steps(times, 5, None)
     assert shown.fps == 25 and "--real-time" in shown.notes[0]
-    assert np.array_equal(np.array(shown.texts["times"].split(), float), times)
+    assert np.array_equal(np.array(shown.times), times)
     real = time_steps(times, 5, None, real_time=True)
     assert real.fps == pytest.approx(1 / 5.0058e-5, rel=1e-3) and not real.notes
     assert time_steps(frames * 60, 5, None).fps == 25  # a step a minute
@@ -167,10 +167,10 @@ def test_points_that_part_later_stay_one(tmp_path: Path) -> None:
 
 def test_times_follow_the_frames(tmp_path: Path, run: Any) -> None:
     waves = waving(4, 5)
-    metadata = replace(waves.metadata, start_time=0.0, texts={"times": "0 100 250 300 301.5"})
+    metadata = replace(waves.metadata, start_time=0.0, times=(0, 100, 250, 300, 301.5))
     gvpipe.write(replace(waves, metadata=metadata), tmp_path / "in.npz")
     some = gvpipe.read(tmp_path / "in.npz", frames=(1, 4))
-    assert (some.metadata.texts["times"], some.metadata.start_time) == ("100 250 300", 100)
+    assert (some.metadata.times, some.metadata.start_time) == ((100, 250, 300), 100)
     assert run("encode", tmp_path / "in.npz", tmp_path / "a.mp4").status == 0
     assert run("decode", tmp_path / "a.mp4", tmp_path / "b.pvd", "--frames", "2:").status == 0
     text = (tmp_path / "b.pvd").read_text()

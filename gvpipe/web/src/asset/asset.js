@@ -13,6 +13,7 @@ import {
   DIRECTORY_VERSION as VERSION,
   ENCODER_ARRANGEMENT as ARRANGEMENT,
   ENCODER_CODED as CODED,
+  TIMES_SECTION as TIMES,
 } from "../constants.js";
 import { decodeAttribute } from "../attributes/attribute_coding.js";
 import { Surface } from "../attributes/surface.js";
@@ -27,6 +28,7 @@ import { Kernels } from "../wasm/kernels.js";
 import { kernelCode } from "../wasm/inflated.js";
 import { AssetEntry } from "./asset_entry.js";
 import { readImages, readMaterials } from "./materials.js";
+import { readTimes } from "./times.js";
 
 const MAX_PARTS = 2 ** 22;
 const MAX_COMPONENTS = 64;
@@ -72,7 +74,7 @@ export async function readAsset(payload, video, positions) {
   const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, polygons, positions);
   const { frameCount, vertexCount, triangleCount } = video;
   const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, polygons, host }, notes);
-  const metadata = list.given.metadata ?? {};
+  const metadata = await readMetadata(list, payload);
   const close = () => host.close();
   return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
 }
@@ -80,7 +82,15 @@ export async function readAsset(payload, video, positions) {
 /** What a coarser level of detail has of an asset: its metadata. @returns {Promise<typeof NO_ASSET>} @throws {GeometryVideoError} */
 export async function readCoarseAsset(payload) {
   const list = await readList(payload);
-  return { ...NO_ASSET, metadata: list?.given.metadata ?? {} };
+  return { ...NO_ASSET, metadata: list ? await readMetadata(list, payload) : {} };
+}
+
+/** What a scene says of itself; `times` of the frames as a Float64Array, where they do not follow from the rate. */
+async function readMetadata(list, payload) {
+  const metadata = { ...list.given.metadata };
+  const data = payload.sections.get(TIMES);
+  if (data) metadata.times = await readTimes(data, payload.header.frames);
+  return metadata;
 }
 
 /** The list of what an asset has; null if a file has none, or one of a newer gvpipe. */

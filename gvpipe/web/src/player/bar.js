@@ -56,6 +56,7 @@ export class Bar {
   /** @param {import("../geometry_video.js").GeometryVideo} video */
   setVideo(video) {
     this.frames = video.frameCount;
+    this.times = video.metadata.times; // of a simulation, whose steps are no frames of a film
     this.slider.max = video.frameCount - 1;
     const bits = (8 * video.byteLength) / (video.vertexCount * video.frameCount);
     this.facts.textContent = [
@@ -80,7 +81,8 @@ export class Bar {
   setFrame(frame) {
     this.slider.value = frame;
     this.slider.ariaValueText = `frame ${frame} of ${this.frames}`;
-    this.count.textContent = `${frame} / ${this.frames - 1}`;
+    const time = this.times ? ` · ${Number(this.times[frame].toPrecision(6))} s` : "";
+    this.count.textContent = `${frame} / ${this.frames - 1}${time}`;
   }
 
   setPlaying(playing) {
