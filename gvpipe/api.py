@@ -154,6 +154,7 @@ def encode(
     scheduler: str | None = None,
     real_time: bool = False,
     warp: str | None = None,
+    volume: bool = False,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -180,7 +181,7 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp: as for `read`.
+        clip, mesh, frames, unlimited, real_time, warp, volume: as for `read`. The volume of a sequence is always coded.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
@@ -208,6 +209,7 @@ def encode(
     clock = _StageClock(progress)
     with open_executor(scheduler, workers) as executor:
         options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited, "real_time": real_time, "warp": warp}
+        options["volume"] = volume
         sequence = _open_source(source, path, fps, options)
         if memory is not None:
             given = fit_segments(given, sequence.n_vertices, memory)
@@ -299,19 +301,22 @@ def open(path: StrPath, *, unlimited: bool = False) -> Player:
 
 
 def compare(
-    reference: MeshSequence | Source, distorted: MeshSequence | Source, progress: Callable[[int, int], None] | None = None
+    reference: MeshSequence | Player | Source,
+    distorted: MeshSequence | Player | Source,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Comparison:
     """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
 
     Args:
-        reference: the original, or what `read` takes; lengths are divided by its size.
+        reference: the original, a player, or what `read` takes; lengths are divided by its size. Where one of both has a
+            volume, the other is read with what lies inside of it.
         distorted: as many frames and vertices, the same triangles in any order; or what `read` takes, such as a geometry video.
         progress: called with (frames done, frames in all) after each block.
 
     Raises:
         InputError: one cannot be read, or the two differ in their number of frames or vertices or in their triangles, so that
             vertices do not correspond.
-        TypeError: one of them is neither a sequence nor a path.
+        TypeError: one of them is neither a sequence, a player nor a path.
 
     Examples:
         >>> import numpy as np
@@ -324,12 +329,21 @@ def compare(
     """
     from gvpipe.metrics.comparison import compare as measure
 
-    both = []
-    for role, given in (("reference", reference), ("distorted", distorted)):
-        if not isinstance(given, MeshSequence | str | os.PathLike | list | tuple):
-            raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence or a path is needed")
-        both.append(given if isinstance(given, MeshSequence) else read(given))
+    given = {"reference": reference, "distorted": distorted}
+    for role, one in given.items():
+        if not isinstance(one, MeshSequence | Player | str | os.PathLike | list | tuple):
+            raise TypeError(f"compare's {role} is {show(one)}; a MeshSequence, a Player or a path is needed")
+    both = [_as_sequence(one) for one in given.values()]
+    if any(each.volume is not None for each in both):
+        pairs = zip(given.values(), both, strict=True)
+        both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
     return measure(both[0], both[1], progress)
+
+
+def _as_sequence(given: MeshSequence | Player | Source, volume: bool = False) -> MeshSequence:
+    if isinstance(given, MeshSequence):
+        return given
+    return given.sequence() if isinstance(given, Player) else read(given, volume=volume)
 
 
 def skin(

@@ -12,7 +12,8 @@ from gvpipe.asset.attribute import KINDS, MAX_COMPONENTS, as_numbers, check_kind
 from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.errors import InputError
 
-DOMAINS = ("vertex", "triangle")
+DOMAINS = ("vertex", "triangle")  # of a surface
+VOLUME_DOMAINS = ("point", "cell")  # of what lies inside of it
 
 
 class FieldFrames(Protocol):
@@ -35,7 +36,7 @@ class Field:
         values: ``(F, R)`` or ``(F, R, C)``, R vertices or triangles: an array, or anything of that shape that slices by
             frame. float32, float64 or integers of at most 32 bits. An array of float64 is rounded to float32, unless that
             moves a value by more than 1e-4 of the range (an absolute pressure of 101325 +- 1 Pa).
-        domain: ``"vertex"`` or ``"triangle"``.
+        domain: ``"vertex"`` or ``"triangle"``; of a `gvpipe.Volume` ``"point"`` or ``"cell"``.
         kind: as of `gvpipe.Attribute`; ``""``: scalar, or vector for several components.
         unit: such as ``"MPa"``.
         range: smallest and largest value, if they are known; of vectors, of all components.
@@ -69,7 +70,7 @@ class Field:
             raise InputError(f"{self.name} has type {given.dtype}; floating-point numbers or integers of 32 bits are needed")
         object.__setattr__(self, "values", as_numbers(given, self.name) if isinstance(given, np.ndarray) else given)
         object.__setattr__(self, "kind", self.kind or ("vector" if len(shape) == 3 and shape[2] > 1 else "scalar"))
-        check_word("domain", self.domain, DOMAINS, self.name)
+        check_word("domain", self.domain, (*DOMAINS, *VOLUME_DOMAINS), self.name)
         check_text(self.unit, f"unit of {self.name}")
         check_word("kind", self.kind, KINDS, self.name)
         check_kind(self.kind, np.zeros((1, self.n_components), self.dtype), self.name)
@@ -153,6 +154,8 @@ def as_field(name: str, given: Any, n_frames: int, rows: dict[str, int], where: 
         shape = tuple(getattr(given, "shape", np.shape(given)))
         domain = "triangle" if len(shape) > 1 and shape[1] == rows["triangle"] != rows["vertex"] else "vertex"
         made = Field(given, domain, name=label)
+    if made.domain not in rows:
+        raise InputError(f"{label} is per {made.domain}; a surface has fields per {' and '.join(DOMAINS)}")
     if made.shape[:2] != (n_frames, rows[made.domain]):
         raise InputError(
             f"{label} has shape {made.shape}; ({n_frames} frames, {rows[made.domain]} rows, one per {made.domain}) is needed"

@@ -120,8 +120,8 @@ def pack_directory(directory: Directory, n_vertices: int) -> bytes:
             "version": VERSION,
             "parts": [_part_values(part) for part in directory.parts],
             "geometry": directory.geometry,
-            "attributes": [_listed_values(each) for each in directory.attributes],
-            "fields": [_listed_values(each) for each in directory.fields],
+            "attributes": [listed_values(each) for each in directory.attributes],
+            "fields": [listed_values(each) for each in directory.fields],
             "materials": [to_plain(material) for material in directory.materials],
             "images": [dataclasses.asdict(image) for image in directory.images],
             "metadata": to_plain(directory.metadata),
@@ -152,8 +152,8 @@ def unpack_directory(data: bytes, n_vertices: int, budget: Budget = UNLIMITED) -
     return Directory(
         parts=tuple(_read_part(part, n_vertices, len(materials)) for part in values.objects("parts", 1 << 22)),
         geometry=values.flag("geometry"),
-        attributes=_unique(values, (_read_listed(each, DOMAINS) for each in values.objects("attributes", MOST))),
-        fields=_unique(values, (_read_listed(each, FIELD_DOMAINS) for each in values.objects("fields", MOST))),
+        attributes=_unique(values, (read_listed(each, DOMAINS) for each in values.objects("attributes", MOST))),
+        fields=_unique(values, (read_listed(each, FIELD_DOMAINS) for each in values.objects("fields", MOST))),
         materials=materials,
         images=images,
         metadata=_from_plain(Metadata, values.object("metadata")),
@@ -216,13 +216,15 @@ def _read_part(values: JsonObject, n_vertices: int, n_materials: int) -> Part:
     return Part(values.text("name"), (low, high), (0, 0), material, values.text("parent", ""))
 
 
-def _listed_values(listed: Listed) -> dict[str, Any]:
+def listed_values(listed: Listed) -> dict[str, Any]:
+    """An entry as JSON values."""
     values = dataclasses.asdict(listed)
     del values["reduced"]
     return values if listed.reduced is None else {**values, "reduced": listed.reduced.values()}
 
 
-def _read_listed(values: JsonObject, domains: tuple[str, ...]) -> Listed:
+def read_listed(values: JsonObject, domains: tuple[str, ...]) -> Listed:
+    """Mirror of `listed_values`; raises `CorruptFile`."""
     low, high = values.numbers("range", 2, -HUGE, HUGE) if "range" in values else (None, None)
     domain, coding = values.choice("domain", domains), values.integer("coding", 0, 1 << 16)
     components = values.integer("components", 0, MAX_COMPONENTS)

@@ -40,6 +40,7 @@ from gvpipe.asset_coding.reduction import NO_REDUCTION, Reduction
 from gvpipe.asset_coding.scan import WHOLE_KINDS, Scan, are_whole, longest_vector, scan_field
 from gvpipe.asset_coding.times import SECTION as TIMES
 from gvpipe.asset_coding.times import pack_times
+from gvpipe.asset_coding.volume_encoder import VolumeCoder
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
@@ -137,6 +138,9 @@ class AssetCoder:
     def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
         self._sequence = sequence
         self.plan = plan_asset(sequence, options)
+        volume = sequence.volume
+        kept = {**self.plan.attributes, **self.plan.fields}
+        self._volume = None if volume is None else VolumeCoder(sequence, volume, options, kept)
         self._fields: dict[tuple[str, bytes], bytes] = {}
         self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
 
@@ -145,7 +149,7 @@ class AssetCoder:
         """Whether there is nothing beside positions and triangles."""
         given = self._sequence
         is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
-        return is_bare and given.polygons is None and _with_losses(given) == NO_METADATA
+        return is_bare and given.polygons is None and given.volume is None and _with_losses(given) == NO_METADATA
 
     def add(self, encoded: Encoded, codec: Codec, is_final: bool = True) -> Bitstream:
         """Return the bitstream with the asset's sections; those that it has are replaced.
@@ -172,6 +176,9 @@ class AssetCoder:
         origins = Origins(permutation, sources.corners, sources.triangles)
         attributes = self._add_attributes(sections, origins, surface)
         fields = self._add_fields(sections, origins, surface, arrangement.polygons, reader if is_final else None)
+        if self._volume is not None:
+            faces, n_beside = place[self._sequence.faces], sum(map(len, sections.values()))
+            sections |= self._volume.sections(permutation, place.astype(np.int64), reader, faces, n_beside, is_final)
         metadata = _with_losses(self._sequence)
         if len(metadata.times) == encoded.bitstream.n_frames:
             sections[TIMES] = pack_times(metadata.times)

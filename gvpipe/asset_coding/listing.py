@@ -7,17 +7,20 @@ import itertools
 from collections.abc import Iterable
 from typing import Any
 
+from gvpipe.asset.field import VOLUME_DOMAINS
 from gvpipe.asset.listing import Things, list_things
 from gvpipe.asset.metadata import losses_of
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import VERSION, Directory, Listed, file_notes, read_images
+from gvpipe.asset_coding.volume_list import SECTION as VOLUME
+from gvpipe.asset_coding.volume_reader import read_volume_list
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.outline import Outline
 from gvpipe.foundation.errors import corrupt
 
 
 def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> dict[str, Any]:
-    """Parts, attributes, fields, polygons, materials, images, metadata and notes, each with its bytes where it has some.
+    """Parts, attributes, fields, polygons, materials, images, metadata, volume and notes, with bytes where they have some.
 
     Args:
         directory, outline: of the bitstream.
@@ -37,7 +40,24 @@ def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> 
             {**values, "range": listed.range and list(listed.range)}
             for values, listed in zip(_listed(directory.fields, bitstream), directory.fields, strict=True)
         ],
+        "volume": _volume(bitstream),
         "notes": list(file_notes(directory, bitstream)),
+    }
+
+
+def _volume(bitstream: Bitstream) -> dict[str, Any] | None:
+    listed = read_volume_list(bitstream)
+    if listed is None:
+        return None
+    n_bytes = sum(size for name, size in bitstream.section_sizes.items() if name.startswith(VOLUME))
+    names = {domain: [each.name for each in listed.numbers if each.domain == domain] for domain in VOLUME_DOMAINS}
+    return {
+        "cells": listed.cells,
+        "points": listed.points,
+        "bound": listed.bound,
+        "point_fields": names["point"],
+        "cell_fields": names["cell"],
+        "bytes": n_bytes,
     }
 
 

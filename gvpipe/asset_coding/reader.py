@@ -32,11 +32,13 @@ from gvpipe.asset_coding.directory import (
     vertex_starts,
 )
 from gvpipe.asset_coding.reduction import NO_REDUCTION
+from gvpipe.asset_coding.volume_list import SECTION as VOLUME
 from gvpipe.coding.codec import FrameReader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.arrays import Array, Float32, Int32
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.errors import InputError, corrupt_section, in_file
+from gvpipe.grids.volume import Volume
 from gvpipe.mesh.hierarchy import keep_hierarchy
 from gvpipe.runtime.forks import ForkLock, kept
 
@@ -139,6 +141,15 @@ class AssetReader:
     def images(self) -> tuple[Image, ...]:
         """What the materials' textures show."""
         return read_images(self.directory, self._bitstream)
+
+    @kept
+    def volume(self) -> Volume | None:
+        """What lies inside of the surface; None where there is nothing."""
+        from gvpipe.asset_coding.volume_reader import read_volume
+
+        if VOLUME not in self._bitstream.sections:
+            return None
+        return read_volume(self._bitstream, (self.faces, self.polygons), self.attributes, self.fields, self._path)
 
     @property
     def metadata(self) -> Metadata:

@@ -48,7 +48,7 @@ def unpack_times(data: bytes, n_frames: int, budget: Budget = UNLIMITED) -> tupl
         given = inflater.decompress(data, 8 * n_frames + 1)
     except zlib.error as exc:
         raise corrupt_section(SECTION, f"it does not inflate ({exc})") from exc
-    if len(given) != 8 * n_frames or inflater.unconsumed_tail or inflater.unused_data:
+    if len(given) != 8 * n_frames or not inflater.eof or inflater.unused_data:
         raise corrupt_section(SECTION, f"it does not hold a time for each of {n_frames} frames")
     planes = np.frombuffer(given, np.uint8)
     zigzag = np.ascontiguousarray(planes.reshape(8, -1).T).view("<u8")[:, 0]

@@ -37,6 +37,9 @@ def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
     for image in info.images:
         size = "x".join(map(str, image["size"])) if image["size"] else "size unknown"
         yield f"image {image['name']}: {image['media_type']}, {size}, {image['bytes']} bytes"
+    if (volume := getattr(info, "volume", None)) is not None:
+        names = ", ".join([*volume["point_fields"], *volume["cell_fields"]]) or "no numbers"
+        yield f"volume: {volume['cells']} cells, {volume['points']} inner points, {names}, {volume['bytes']} bytes"
     about = dict(info.metadata)
     times, texts = about.pop("times"), about.pop("texts")
     said = {key: value for key, value in about.items() if value} | texts

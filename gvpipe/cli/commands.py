@@ -414,19 +414,25 @@ def compare(
     span = parse_frames(frames)
     its_mesh, other_mesh = _meshes((reference, distorted), mesh)
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
-        given = files.read(one, fps, clip, its_mesh, span, unlimited=unlimited)
+        read_given = partial(files.read, one, fps, clip, its_mesh, span, unlimited=unlimited)
         read_other = partial(files.read, other, None, other_clip, other_mesh, unlimited=unlimited)
+        given = read_given()
+        compared = read_other() if span is None else _same_frames(read_other, span, len(given))
+        if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
+            read_other = partial(read_other, volume=True)
+            given = given if given.volume is not None else read_given(volume=True)
+            compared = read_other() if span is None else _same_frames(read_other, span, len(given))
         result = comparison.compare(
             given,
-            read_other() if span is None else _same_frames(read_other, span, len(given)),
+            compared,
             lambda done, of: progress("compare", done / of) if progress else None,
         )
     values = result.to_json()
     out.json(values)
     for name, value in values.items():
-        if name not in ("frames", "attributes", "fields"):
+        if name not in ("frames", "attributes", "fields", "volume"):
             out.text(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
-    for kind, errors in (("attribute", result.attributes), ("field", result.fields)):
+    for kind, errors in (("attribute", result.attributes), ("field", result.fields), ("inside", result.volume)):
         for name, error in errors.items():
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"

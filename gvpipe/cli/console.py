@@ -115,6 +115,9 @@ real_time_option = click.option(
     is_flag=True,
     help="Keep a simulation's clock. [default: steps under 1/240 s or over 2 s become 25 frames a second; times are kept]",
 )
+volume_option = click.option(
+    "--volume", is_flag=True, help="Keep what lies inside of a simulation's surface: volume cells, points and their numbers."
+)
 warp_option = click.option(
     "--warp", metavar="NAME[:SCALE]", help="Move vertices by a field of displacements, SCALE times as far. [default scale: 1]"
 )

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.cli.console import Output, compress_option, output_options, real_time_option, unlimited_option, warp_option
+from gvpipe.cli.console import (
+    Output,
+    compress_option,
+    output_options,
+    real_time_option,
+    unlimited_option,
+    volume_option,
+    warp_option,
+)
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import shape as shape_of
@@ -55,6 +63,7 @@ if TYPE_CHECKING:
 @click.option("--max-error", metavar="LENGTH|PERCENT%", help="Largest distance of any vertex that the skeleton moves.")
 @real_time_option
 @warp_option
+@volume_option
 @compress_option
 @unlimited_option
 @output_options
@@ -77,6 +86,7 @@ def convert(
     max_error: str | None,
     real_time: bool,
     warp: str | None,
+    volume: bool,
     compress: str,
     unlimited: bool,
     out: Output,
@@ -106,20 +116,22 @@ def convert(
     number, is_rigid = parse_joints(joints)
     wanted = SkinOptions(number, target_kg, max_error, is_rigid, correctives)
     check_glb_options(target, skin, compress, wanted)
+    how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
     if split:
         if clip == ALL or lod or start is not None or stop is not None or target == PIPE:
             raise click.UsageError(
                 "--split goes with --frames, and not with --clip all, --start, --stop, --lod or an OUTPUT of -"
             )
-        options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), "unlimited": unlimited}
-        options |= {"real_time": real_time, "warp": warp}
+        options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), **how}
         _convert_split(source, target, options, parts, wanted if skin else None, compress, out)
         return
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         read = (
             _level_reader(given, lod, unlimited)
             if lod
-            else partial(files.read, given, clip=clip, mesh=mesh, unlimited=unlimited, real_time=real_time, warp=warp)
+            else partial(
+                files.read, given, clip=clip, mesh=mesh, unlimited=unlimited, real_time=real_time, warp=warp, volume=volume
+            )
         )
         clips: tuple[Clip, ...] = ()
         if clip == ALL and (names := clip_names(given)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gvpipe.cli.console import real_time_option, unlimited_option, warp_option
+from gvpipe.cli.console import real_time_option, unlimited_option, volume_option, warp_option
 
 if TYPE_CHECKING:
     from gvpipe.coding.codec import Codec
@@ -61,6 +61,7 @@ OPTIONS = (
     click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out."),
     real_time_option,
     warp_option,
+    volume_option,
     click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp."),
     click.option(
         "--stream",
@@ -124,7 +125,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
         lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
         frozenset(settings),
     )
-    reading = {name: options[name] for name in ("fps", "clip", "mesh", "real_time", "warp")} | {
+    reading = {name: options[name] for name in ("fps", "clip", "mesh", "real_time", "warp", "volume")} | {
         "frames": parse_frames(options["frames"])
     }
     making = {**targets, "textures": options["textures"], "stream": options["stream"], "bare": options["bare"]}

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.container.cursor import Cursor, varint
+from gvpipe.fields.graph import FieldGraph
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.foundation.arrays import Array, Float32, Float64
 from gvpipe.foundation.errors import InputError
@@ -63,6 +64,17 @@ class Motion:
             needed = (stop - start, self.mesh.n_vertices, 3)
             raise InputError(f"positions of frames {start} to {stop - 1} have shape {points.shape}; {needed} is needed")
         return self.mesh.middles(points.astype(np.float64))
+
+
+def motion_of(positions: Positions, n_frames: int, mesh: FieldMesh | FieldGraph) -> Motion:
+    """The motion of a surface's rows.
+
+    Raises:
+        TypeError: the rows lie inside of a volume; nothing there follows from positions of the surface.
+    """
+    if not isinstance(mesh, FieldMesh):
+        raise TypeError(f"fields per {mesh.domain} do not follow from positions; leave them out")
+    return Motion(positions, n_frames, mesh)
 
 
 @dataclass(frozen=True, eq=False)

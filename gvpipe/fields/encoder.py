@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.fields.derived import Motion, Positions, Span
+from gvpipe.fields.derived import Positions, Span, motion_of
+from gvpipe.fields.graph import FieldGraph
 from gvpipe.fields.head import Head, longest_segment
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.segment import MODES, Place, cost
@@ -28,7 +29,7 @@ SHARE = 0.5  # of the budget of a file of the section's size, that a segment may
 def encode_field(
     read: Read,
     n_frames: int,
-    mesh: FieldMesh,
+    mesh: FieldMesh | FieldGraph,
     bound: FieldBound,
     name: str = "field",
     *,
@@ -36,6 +37,7 @@ def encode_field(
     holes: bool = False,
     modes: tuple[str, ...] = MODES,
     progress: Progress | None = None,
+    n_beside: int = 0,
 ) -> bytes:
     """Return the section of a field.
 
@@ -59,6 +61,7 @@ def encode_field(
         holes: whether NaN is kept, instead of refused.
         modes: of `gvpipe.fields.segment.MODES`; the smallest is chosen for each segment.
         progress: called with the share that is done.
+        n_beside: bytes of the file beside this section, as far as they are known.
 
     Where values take few bytes, segments become shorter: a reader decodes one within the budget of a small file.
 
@@ -72,7 +75,7 @@ def encode_field(
     if not 0 < n_components <= MAX_COMPONENTS:
         raise InputError(f"field {name!r} has {n_components} components; 1 to {MAX_COMPONENTS} are possible")
     head = Head(first.dtype, n_components, longest_segment(mesh.n_rows, n_components))
-    motion = None if positions is None else Motion(positions, n_frames, mesh)
+    motion = None if positions is None else motion_of(positions, n_frames, mesh)
     while True:
         segments, least = [], (math.inf, 0)
         for start, stop in pairwise(head.bounds(n_frames)):
@@ -92,7 +95,7 @@ def encode_field(
             if progress is not None:
                 progress(stop / n_frames)
         section = head.pack(segments)
-        longest = _affordable(head, n_frames, mesh.n_rows, len(section))
+        longest = _affordable(head, n_frames, mesh.n_rows, len(section) + n_beside)
         if longest >= min(head.longest, n_frames):
             return section
         head = replace(head, longest=longest)
@@ -114,7 +117,7 @@ def _smallest_frame(values: Array, start: int) -> tuple[float, int]:
     return sums[smallest], start + smallest
 
 
-def _checked(values: Array, span: tuple[int, int], mesh: FieldMesh, name: str) -> Array:
+def _checked(values: Array, span: tuple[int, int], mesh: FieldMesh | FieldGraph, name: str) -> Array:
     start, stop = span
     values = np.asarray(values)
     if values.ndim != 3 or values.shape[:2] != (stop - start, mesh.n_rows):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.container.segments import segments_between
-from gvpipe.fields.derived import Motion, Positions, Span
+from gvpipe.fields.derived import Positions, Span, motion_of
+from gvpipe.fields.graph import FieldGraph
 from gvpipe.fields.head import read_head
 from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.segment import Place, decode_segment, read_mode
@@ -33,7 +34,7 @@ class FieldReader:
         self,
         data: bytes,
         n_frames: int,
-        mesh: FieldMesh,
+        mesh: FieldMesh | FieldGraph,
         name: str,
         positions: Positions | None = None,
         *,
@@ -43,7 +44,7 @@ class FieldReader:
         self._bounds = self._head.bounds(n_frames)
         self._budget = budget
         self._mesh, self._name, self._n_frames = mesh, name, n_frames
-        self._motion = None if positions is None else Motion(positions, n_frames, mesh)
+        self._motion = None if positions is None else motion_of(positions, n_frames, mesh)
         self._last: tuple[int, Array] | None = None
 
     @property

@@ -69,7 +69,8 @@ def not_carried(names: Sequence[str]) -> tuple[str, ...]:
 def left_behind(names: Sequence[str]) -> tuple[str, ...]:
     """The note for what a source has beside what is read."""
     shown = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
-    return (f"the source has what is not carried: {shown}",) if names else ()
+    remedy = "; --volume carries volume cells" if any(name.startswith("volume cells") for name in names) else ""
+    return (f"the source has what is not carried: {shown}{remedy}",) if names else ()
 
 
 def over_budget(reason: str) -> str:

@@ -36,6 +36,7 @@ STEPS = (".vtk", *VTK_XML, *BLOCKS)  # of simulations, that lists with times may
 BY_MESHIO = (
     ".msh", ".inp", ".bdf", ".fem", ".nas", ".mesh", ".meshb", ".su2", ".avs", ".vol", ".f3grid", ".mdpa", ".tec",
 )  # fmt: skip
+VOLUMES = (*STEPS, *BY_MESHIO)  # whose cells may have an inside
 TIMED = late("simulation.file_times", "timed")
 
 FRAME_FORMATS = {

@@ -20,6 +20,7 @@ class ReadOptions:
             changes are read from frame to frame where it does not.
         unlimited: whether a library that runs in a process of its own may take any memory.
         real_time: whether steps of a simulation keep their clock, however many there are a second.
+        volume: whether what lies inside of a simulation's surface is read, too.
     """
 
     fps: float | None = None
@@ -28,6 +29,7 @@ class ReadOptions:
     frames: tuple[int, int | None] | None = None
     unlimited: bool = False
     real_time: bool = False
+    volume: bool = False
 
     def span(self, n_frames: int, where: str) -> tuple[int, int]:
         """First frame of a file of ``n_frames``, and the one after the last; ``where`` is the file, for messages.

@@ -29,6 +29,7 @@ def read(
     frames: tuple[int, int | None] | None = None,
     unlimited: bool = False,
     real_time: bool = False,
+    volume: bool = False,
 ) -> MeshSequence:
     """Read a mesh sequence.
 
@@ -45,12 +46,13 @@ def read(
         unlimited: whether OpenUSD may take any memory (`gvpipe.io.usd.worker`).
         real_time: whether steps of a simulation keep their clock, however many there are a second; else the film has a rate
             that a person can watch (`gvpipe.io.simulation.times`).
+        volume: whether what lies inside of a simulation's surface is read, too (`gvpipe.Volume`).
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
-    options = ReadOptions(fps, clip, mesh, frames, unlimited, real_time)
+    options = ReadOptions(fps, clip, mesh, frames, unlimited, real_time, volume)
     if isinstance(path, str) and is_stored(path):
         from gvpipe.io.store_files import read_stored
 
@@ -95,7 +97,7 @@ def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], optio
 def _read_frames(path: str | list[str], options: ReadOptions) -> MeshSequence:
     from gvpipe.io.frames.reader import read_frames
 
-    return read_frames(path, options.fps, options.frames, options.real_time)
+    return read_frames(path, options.fps, options.frames, options.real_time, options.volume)
 
 
 READERS = scene_readers(read)

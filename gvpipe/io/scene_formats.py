@@ -45,6 +45,7 @@ WRITERS: dict[str, SceneWriter] = {
     ".npy": late("point_cache", "write_npy"),
     ".pvd": late("simulation.pvd_writer", "write_pvd"),
     ".vtkhdf": late("simulation.vtkhdf_writer", "write_vtkhdf"),
+    ".xdmf": late("simulation.xdmf_writer", "write_xdmf"),
     OPENVAT: late("openvat", "write_openvat"),
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from gvpipe.container.sources import check_target
@@ -19,6 +20,8 @@ from gvpipe.model.skin import Skin
 SKIN_WRITER = late("gltf", "write_skinned")
 USD_SKIN_WRITER = late("usd.writer", "write_usd")
 GLB_WRITER = late("gltf", "write_animated")
+VTU_WRITER = late("simulation.vtu_writer", "write_vtu")
+HOLD_VOLUMES = (".vtu", ".pvd", ".vtkhdf", ".xdmf")
 COMPRESSIONS = ("none", "meshopt")
 
 
@@ -83,6 +86,12 @@ def write(
         return tuple(SKIN_WRITER(sequence, skin, Path(path), is_packed))
     if is_packed:
         return tuple(GLB_WRITER(sequence, Path(path), is_packed))
+    if suffix == ".vtu":
+        return tuple(VTU_WRITER(sequence, Path(path), start))
+    if sequence.volume is not None and suffix not in HOLD_VOLUMES:
+        cells, inner = len(sequence.volume.cells.types), sequence.volume.n_points
+        left = f"the volume's {cells} cells and {inner} inner points are left out; {', '.join(HOLD_VOLUMES)} hold them"
+        return (*write(replace(sequence, volume=None), path, start), left)
     writer = WRITERS.get(suffix)
     # .glb may be a frame, too: of a pattern, or of a sequence of one
     is_frame = suffix in FRAME_FORMATS and (sequence.n_frames == 1 or match_pattern(path) is not None or os.path.isdir(path))

@@ -64,6 +64,32 @@ def compare_fields(reference: MeshSequence, distorted: MeshSequence, pairing: In
     return result
 
 
+def compare_volumes(reference: MeshSequence, distorted: MeshSequence) -> AssetErrors:
+    """The same for what lies inside: ``(points)``, whose errors are lengths, and numbers of points and of cells.
+
+    Points and cells of both are in one order; where they are others, or one side has none, errors are null.
+    """
+    ours, theirs = reference.volume, distorted.volume
+    if ours is None and theirs is None:
+        return {}
+    result: AssetErrors = {"(points)": {"max": None, "mean": None}}
+    if ours is None or theirs is None or ours.points.shape != theirs.points.shape:
+        return result
+    apart = distorted.origin - reference.origin
+    lengths = []
+    for k in range(reference.n_frames):
+        difference = np.asarray(theirs.points[k : k + 1], np.float64) + apart - ours.points[k : k + 1]
+        lengths.append(np.linalg.norm(difference, axis=2))
+    result["(points)"] = _errors(lengths)
+    for mine, others in ((ours.point_fields, theirs.point_fields), (ours.cell_fields, theirs.cell_fields)):
+        for name in dict.fromkeys([*mine, *others]):
+            result[name] = {"max": None, "mean": None}
+            a, b = mine.get(name), others.get(name)
+            if a is not None and b is not None and (*a.shape[:2], a.n_components) == (*b.shape[:2], b.n_components):
+                result[name] = _errors(_field_differences(a, b, np.arange(a.shape[1])))
+    return result
+
+
 def _field_differences(ours: Field, theirs: Field, rows: Integers) -> list[Float64]:
     step = max(1, BLOCK_BYTES // (8 * ours.shape[1] * ours.n_components))
     result = []

@@ -19,7 +19,7 @@ from gvpipe.foundation.arguments import show
 from gvpipe.foundation.arrays import Integers
 from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.topology import unique_edges
-from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare_fields
+from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare_fields, compare_volumes
 from gvpipe.metrics.correspondence import canonical_triangles, match_vertices
 from gvpipe.metrics.hausdorff import Hausdorff
 from gvpipe.metrics.sted import Sted
@@ -36,7 +36,8 @@ class Comparison:
 
     Model units: ``rmse``, ``max``, ``hausdorff`` and both values per frame. Fractions of the reference's frame-0
     bounding-box diagonal: ``rmse_diag``, ``max_diag``. Percent: ``kg`` and ``da``. Without unit: the ``sted`` values.
-    ``attributes`` and ``fields`` have the largest and mean error of each, in its own unit, degrees for normals and tangents.
+    ``attributes`` and ``fields`` have the largest and mean error of each, in its own unit, degrees for normals and tangents;
+    ``volume`` has those of what lies inside of the surface.
     """
 
     rmse: float
@@ -52,6 +53,7 @@ class Comparison:
     frames: list[dict[str, float]]
     attributes: AssetErrors = field(default_factory=dict)
     fields: AssetErrors = field(default_factory=dict)
+    volume: AssetErrors = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
@@ -116,6 +118,7 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
         frames=[{"rmse": float(r), "max": float(m)} for r, m in zip(errors.rmse, errors.largest, strict=True)],
         attributes=compare_attributes(reference, given, same),
         fields=compare_fields(reference, given, same),
+        volume=compare_volumes(reference, given),
     )
 
 

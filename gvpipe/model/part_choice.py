@@ -75,6 +75,7 @@ def parts_alone(sequence: MeshSequence, names: Sequence[str]) -> MeshSequence:
         sequence.reordered(kept, before[chosen.faces].astype(np.int32)),
         parts=parts,
         polygons=_polygons(sequence, names),
+        volume=None,
         attributes=_chosen(chosen.attributes, rows),
         fields=_chosen(chosen.fields, rows),
         materials=sequence.materials,

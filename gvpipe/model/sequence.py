@@ -29,6 +29,7 @@ from gvpipe.foundation.arguments import check_number, show
 from gvpipe.foundation.arrays import Array, Float32, Float64, Floats, Frames, Int32, Integers
 from gvpipe.foundation.errors import InputError, printable
 from gvpipe.foundation.notes import ASSUMED_FPS, count, show_origin
+from gvpipe.grids.volume import Volume
 from gvpipe.model.frame_views import Guarded, Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.model.origin import as_origin, choose_origin, narrow, rounding
 
@@ -39,6 +40,7 @@ BARE: dict[str, Any] = {
     "polygons": None,
     "materials": (),
     "images": (),
+    "volume": None,
 }
 CHUNK_BYTES = 4 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
@@ -68,6 +70,7 @@ class MeshSequence:
         images: what the materials' textures show.
         metadata: up axis, unit, start time, source, texts.
         not_carried: what the source has and the sequence has not, by name.
+        volume: what lies inside of the surface, of a simulation.
 
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
@@ -99,6 +102,7 @@ class MeshSequence:
     images: tuple[Image, ...] = ()
     metadata: Metadata = NO_METADATA
     not_carried: tuple[str, ...] = ()
+    volume: Volume | None = None
     _exact: Frames | None = field(default=None, init=False)  # absolute; what float32 rounded
     _rounding: float = field(default=0.0, init=False)
 
@@ -136,6 +140,8 @@ class MeshSequence:
         for image in self.images:
             if not isinstance(image, Image):
                 raise TypeError(f"an image is {show(image)}; a gvpipe.Image is needed")
+        if self.volume is not None:
+            self.volume.check_surface(self.n_frames, self.n_vertices, self.name)
         cleaner = Cleaner(self.name)
         images = tuple(map(cleaner.image, self.images))
         materials = check_materials(tuple(map(cleaner.material, self.materials)), len(images), self.name)
@@ -281,7 +287,8 @@ class MeshSequence:
         exact = None if self._exact is None else Span(self.read_absolute, start, *size)
         fields = {name: each.part(start, stop) for name, each in self.fields.items()}
         metadata = self.metadata.of_frames(start, stop, self.n_frames)
-        return self._derived(Span(self.read, start, *size), exact, fields=fields, metadata=metadata)
+        volume = None if self.volume is None else self.volume.part(start, stop)
+        return self._derived(Span(self.read, start, *size), exact, fields=fields, metadata=metadata, volume=volume)
 
     def local(self) -> MeshSequence:
         """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""

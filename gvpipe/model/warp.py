@@ -9,6 +9,7 @@ import numpy as np
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.arrays import Array, Float32
 from gvpipe.foundation.errors import InputError, SettingError
+from gvpipe.grids.volume import Volume
 from gvpipe.model.sequence import MeshSequence
 
 USUAL = ("displacement", "displacements", "disp", "displ", "u", "depl")  # names of what moves a mesh, in lower case
@@ -79,10 +80,33 @@ def warped(sequence: MeshSequence, text: str) -> MeshSequence:
     return replace(
         sequence,
         positions=Warped(sequence, name, scale),
+        volume=_warped_inside(sequence, name, scale),
         attributes={each: one for each, one in sequence.attributes.items() if each not in directions},
         fields={each: one for each, one in sequence.fields.items() if each not in directions},
         notes=tuple(notes),
     )
+
+
+class _WarpedPoints:
+    """Inner points, moved as the surface is."""
+
+    def __init__(self, volume: Volume, name: str, scale: float) -> None:
+        self._volume, self._field, self._scale = volume, volume.point_fields[name], scale
+        self.shape = volume.points.shape
+
+    def __getitem__(self, key: slice, /) -> Float32:
+        start, stop, _ = key.indices(self.shape[0])
+        moves = self._field.read(start, stop) if len(self._field) > 1 else self._field.read(0, 1)
+        return (self._volume.points[start:stop] + self._scale * _in_space(moves)).astype(np.float32)
+
+
+def _warped_inside(sequence: MeshSequence, name: str, scale: float) -> Volume | None:
+    volume = sequence.volume
+    if volume is None or not volume.n_points:
+        return volume
+    if name not in volume.point_fields:
+        raise InputError(f"{sequence.name}: inner points have no {name!r} to warp by; leave the volume out")
+    return replace(volume, points=_WarpedPoints(volume, name, scale))
 
 
 HINT = "the mesh stands still; "
@@ -110,5 +134,10 @@ def movers(sequence: MeshSequence) -> list[str]:
 def _moves(sequence: MeshSequence, name: str, start: int, stop: int) -> Array:
     field = sequence.fields.get(name)
     values = np.asarray(sequence.attributes[name])[None] if field is None else field.read(start, stop)
+    return _in_space(values)
+
+
+def _in_space(values: Array) -> Array:
+    """Vectors ``(n, R, 2 or 3)`` as three numbers each, float64."""
     values = values.astype(np.float64)
     return values if values.shape[2] == 3 else np.concatenate([values, np.zeros((*values.shape[:2], 1))], axis=2)

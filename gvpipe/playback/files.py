@@ -33,6 +33,7 @@ def read(
     unlimited: bool = False,
     real_time: bool = False,
     warp: str | None = None,
+    volume: bool = False,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
@@ -47,13 +48,14 @@ def read(
         real_time: whether steps of a simulation keep their clock; else those that are shorter than 1/240 s or longer than 2 s
             become a film of 25 frames a second. The times are kept either way.
         warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
+        volume: whether what lies inside of a simulation's surface is read, too: volume cells, inner points, and their numbers.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
         SettingError: ``warp`` is of another form.
         TypeError: it is no path.
     """
-    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time)
+    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, volume)
     if warp is None:
         return sequence
     from gvpipe.model.warp import warped
@@ -69,6 +71,7 @@ def _read(
     frames: tuple[int, int | None] | None,
     unlimited: bool,
     real_time: bool,
+    volume: bool,
 ) -> MeshSequence:
     from gvpipe.io.reading import read as read_sequence
 
@@ -76,11 +79,11 @@ def _read(
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps, clip, mesh, frames, unlimited, real_time)
+            return read_sequence(path, fps, clip, mesh, frames, unlimited, real_time, volume)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_remote(one):
-        return read_sequence(one, fps, clip, mesh, frames, unlimited, real_time)
+        return read_sequence(one, fps, clip, mesh, frames, unlimited, real_time, volume)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     if mesh is not None:
@@ -103,6 +106,7 @@ def read_runs(
     unlimited: bool = False,
     real_time: bool = False,
     warp: str | None = None,
+    volume: bool = False,
 ) -> list[Run]:
     """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
 
@@ -114,7 +118,8 @@ def read_runs(
     from gvpipe.io.runs import find_runs
 
     return find_runs(
-        lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited, real_time=real_time, warp=warp), frames
+        lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited, real_time=real_time, warp=warp, volume=volume),
+        frames,
     )
 
 

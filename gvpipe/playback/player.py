@@ -28,6 +28,7 @@ from gvpipe.container.sources import is_remote
 from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
+from gvpipe.grids.volume import Volume
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
 from gvpipe.model.skin import Skin
@@ -116,6 +117,12 @@ class Player:
     def metadata(self) -> Metadata:
         """What the scene says of itself."""
         return self._asset.metadata
+
+    @property
+    def volume(self) -> Volume | None:
+        """What lies inside of the surface, of a simulation; None where the file has nothing of it."""
+        with in_file(self.path):
+            return self._asset.volume
 
     @property
     def times(self) -> Float64:
@@ -215,6 +222,7 @@ class Player:
             materials=self.materials,
             images=self.images,
             metadata=self.metadata,
+            volume=self.volume,
         )
 
     def __len__(self) -> int:

@@ -38,6 +38,7 @@ class Info:
         materials: names.
         images: name, media type, width, height and bytes.
         metadata: up axis, unit, start time, source, texts.
+        volume: of what lies inside of the surface: cells, inner points, the bound on these, names of numbers, bytes; or None.
         not_carried: what the source had beside what the file carries.
         notes: what a user should know, a line each.
     """
@@ -63,6 +64,7 @@ class Info:
     materials: list[str]
     images: list[dict[str, Any]]
     metadata: dict[str, Any]
+    volume: dict[str, Any] | None
     not_carried: list[str]
     notes: list[str]
 

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
-from gvpipe.io.formats import FRAME_FORMATS
+from gvpipe.io.formats import FRAME_FORMATS, VOLUMES
 from gvpipe.io.frames.columns import split_columns
 from gvpipe.io.frames.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.frames.frame_files import FrameFiles
 from gvpipe.io.frames.later_looks import changing_looks
+from gvpipe.io.late import late
 from gvpipe.io.options import ReadOptions
 from gvpipe.model.sequence import MeshSequence
 
@@ -21,6 +22,7 @@ def read_frames(
     fps: float | None = None,
     span: tuple[int, int | None] | None = None,
     real_time: bool = False,
+    volume: bool = False,
 ) -> MeshSequence:
     """Read a folder, glob, pattern, list or single file of frames; what is static is that of the first.
 
@@ -29,6 +31,7 @@ def read_frames(
         fps: frames per second.
         span: number of the first file that is read, and of the one after the last (None: all that follow).
         real_time: whether files that tell their times keep that clock (`gvpipe.io.simulation.times`).
+        volume: whether what lies inside of a simulation's surface is read, too.
 
     Raises:
         InputError: no frames, gaps, mixed formats, or a first frame that cannot be read.
@@ -43,6 +46,10 @@ def read_frames(
         name = f"{files[0]} and {len(files) - 1} more"
         noticed = (given_order(len(files)),) if is_kept else ()
     first_file, stop = ReadOptions(frames=span).span(len(files), name)
+    if volume and {file.suffix.lower() for file in files} <= set(VOLUMES):
+        options = ReadOptions(fps, real_time=real_time, volume=True)
+        made: MeshSequence = late("simulation.step_lists", "read_volume_files")(files[first_file:stop], name, options, noticed)
+        return made
     frames = FrameFiles(files[first_file:stop], first_file)
     first = frames.first
     columns = split_columns(frames)
@@ -50,7 +57,7 @@ def read_frames(
     frames.forget_animated()
     if fps is None and len(files) > 1:
         noticed = (*noticed, ASSUMED_FPS)
-    made = MeshSequence(
+    sequence = MeshSequence(
         frames,
         first.faces,
         DEFAULT_FPS if fps is None else fps,
@@ -67,4 +74,4 @@ def read_frames(
         tuple(dict.fromkeys([*first.not_carried, *columns.not_carried, *later])),
     )
     timed = FRAME_FORMATS[frames.paths[0].suffix.lower()].timed
-    return made if timed is None or len(frames.paths) < 2 else timed(made, frames.paths, fps, real_time)
+    return sequence if timed is None or len(frames.paths) < 2 else timed(sequence, frames.paths, fps, real_time)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import pickle
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.atomic import atomic_path
 from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.io.library import process as library_process
-from gvpipe.io.library.writing_worker import ASK, DONE, EXACT, INPUT, POSITIONS, Asked
+from gvpipe.io.library.writing_worker import ASK, CELLS, DONE, EXACT, INPUT, POSITIONS, Asked
 from gvpipe.model.sequence import MeshSequence
 
 WORKER = "gvpipe.io.library.writing_worker"
@@ -71,17 +72,24 @@ def _frames(sequence: MeshSequence, what: str, start: int, stop: int) -> Array:
         return sequence.read(start, stop)
     if what == EXACT:
         return sequence.read_absolute(start, stop)
+    if what.startswith(CELLS) and sequence.volume is not None:
+        return np.asarray(sequence.volume.cell_fields[what.removeprefix(CELLS)].values[start:stop])
     return np.asarray(sequence.fields[what].values[start:stop])
 
 
 def _without_frames(sequence: MeshSequence) -> MeshSequence:
     """The sequence whose frames and fields are asked for."""
-    fields = {
-        name: Field(Asked(name, each.values.shape, each.values.dtype), each.domain, each.kind, each.unit, name=name)
-        for name, each in sequence.fields.items()
-    }
+    fields = {name: _asked(name, each) for name, each in sequence.fields.items()}
+    volume = sequence.volume
+    if volume is not None:
+        inside = {name: _asked(CELLS + name, each) for name, each in volume.cell_fields.items()}
+        volume = replace(volume, cell_fields=inside)
     exact = Asked(EXACT, sequence.shape, "f8") if sequence.is_rounded else None
-    return sequence.reading_from(Asked(POSITIONS, sequence.shape, "f4"), exact, fields=fields)
+    return sequence.reading_from(Asked(POSITIONS, sequence.shape, "f4"), exact, fields=fields, volume=volume)
+
+
+def _asked(what: str, each: Field) -> Field:
+    return Field(Asked(what, each.values.shape, each.values.dtype), each.domain, each.kind, each.unit, name=what)
 
 
 def _why(path: Path) -> str:

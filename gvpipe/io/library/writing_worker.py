@@ -16,7 +16,7 @@ from gvpipe.foundation.atomic import output_error
 from gvpipe.foundation.errors import GvpipeError, InputError
 
 ASK, DONE, INPUT, OUTPUT = "ask", "done", "input", "output"
-POSITIONS, EXACT = ".positions", ".exact"  # no names of fields that any reader makes
+POSITIONS, EXACT, CELLS = ".positions", ".exact", ".cells."  # no names of fields that any reader makes
 _answers: list[IO[bytes]] = []  # to the process that started this one
 
 

@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from gvpipe.grids.cells import Cells, join_cells
 from gvpipe.io.left_behind import LeftBehind
-from gvpipe.io.simulation.cells import Cells, join_cells
 from gvpipe.io.simulation.dataset import Dataset, field_data, join_arrays
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.xml_grids import load_xml_grid

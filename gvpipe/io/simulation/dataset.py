@@ -13,9 +13,9 @@ import numpy as np
 from gvpipe.asset.attribute import MAX_COMPONENTS, WIDTHS
 from gvpipe.asset.part import Part
 from gvpipe.foundation.arrays import Array, Floats
+from gvpipe.grids.cells import Cells
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.mesh import FrameValues
-from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.surface import Surface
 
 

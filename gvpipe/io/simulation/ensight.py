@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
+from gvpipe.grids.cells import Cells, equal_cells, join_cells, structured_cells
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.ensight_case import Series, Variable, parse_case
 from gvpipe.io.simulation.ensight_file import EnsightFile

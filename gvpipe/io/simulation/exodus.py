@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
+from gvpipe.grids.cells import Cells, equal_cells, join_cells
 from gvpipe.io.damage import reading
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.netcdf import NetCdf, open_netcdf, texts
 from gvpipe.io.simulation.steps import read_steps

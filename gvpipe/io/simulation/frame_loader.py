@@ -6,11 +6,11 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from gvpipe.grids.cells import Cells
 from gvpipe.io.damage import FRAME_AGAIN, reading
 from gvpipe.io.formats import BLOCKS
 from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.simulation.blocks import load_multi_block
-from gvpipe.io.simulation.cells import Cells
 from gvpipe.io.simulation.dataset import Dataset, block_parts, surface_values
 from gvpipe.io.simulation.legacy import load_legacy
 from gvpipe.io.simulation.meshio_files import MeshioLoader

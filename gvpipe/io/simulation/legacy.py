@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats, Int64
+from gvpipe.grids.cells import Cells, join_cells, structured_cells
 from gvpipe.io.left_behind import LeftBehind
-from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.xml_grids import as_points, lattice

@@ -20,8 +20,8 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats
 from gvpipe.foundation.errors import InputError
+from gvpipe.grids.cells import Cells, equal_cells, join_cells
 from gvpipe.io.library.process import LibraryProcess
-from gvpipe.io.simulation.cells import Cells, equal_cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 
 WORKER = "gvpipe.io.simulation.meshio_worker"

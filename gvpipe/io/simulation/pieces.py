@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats, Int64
-from gvpipe.io.simulation.cells import Cells
+from gvpipe.grids.cells import Cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 
 GHOSTS = "vtkGhostType"

@@ -7,6 +7,7 @@ of polygons, triangles are written. Numbers per corner have no place.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -57,6 +58,11 @@ class PolyContent:
         """The name of what has a role in VTK, such as its normals; ``""`` if nothing has."""
         named = [(name, one.domain, one.kind) for group in (self.attributes, self.fields) for name, one in group.items()]
         return next((name for name, where, of in named if where == domain and of == kind), "")
+
+    def roles(self, domain: str) -> str:
+        """The same for all roles, as attributes of an XML element."""
+        named = {role: self.role(domain, kind) for kind, role in ROLES.items()}
+        return "".join(f" {role}={quoteattr(key)}" for role, key in named.items() if key)
 
 
 def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = False) -> PolyContent:

@@ -23,11 +23,12 @@ from gvpipe.io.frames.frame_files import FrameFiles
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.dataset import Dataset
-from gvpipe.io.simulation.file_times import TOLD
+from gvpipe.io.simulation.file_times import TOLD, file_times
 from gvpipe.io.simulation.frame_loader import dataset_loader
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.times import empty_note, time_steps
+from gvpipe.io.simulation.volumes import FileSteps
 from gvpipe.io.simulation.xml_root import parse_xml
 from gvpipe.model.sequence import MeshSequence
 
@@ -54,7 +55,26 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
         files = [side_file(path, name, "step", later=True) for _, name, _ in listed]
         n_empty = _count_empty(files) if options.frames is None else 0
         files, listed, start = files[n_empty:], listed[n_empty:], start + n_empty
-    return read_listed(files, np.array([time for time, _, _ in listed], np.float64), path, options, start, empty_note(n_empty))
+    times = np.array([time for time, _, _ in listed], np.float64)
+    if options.volume and len({file.suffix.lower() for file in files}) == 1:
+        steps = read_steps(FileSteps(files, times), path, replace(options, frames=None))
+        return replace(steps, notes=(*empty_note(n_empty), *steps.notes))
+    return read_listed(files, times, path, options, start, empty_note(n_empty))
+
+
+def read_volume_files(files: list[Path], name: str, options: ReadOptions, notes: tuple[str, ...]) -> MeshSequence:
+    """Return the sequence of files of one time step each, with what lies inside of its surface; raises `InputError`.
+
+    Args:
+        files: in the order of time, of one format.
+        name: what names them.
+        options: as of `read_steps`.
+        notes: of whoever found them.
+    """
+    times = file_times(files) if len(files) > 1 else None
+    sequence = read_steps(FileSteps(files, times), Path(name), options)
+    left = tuple(each for each in sequence.not_carried if each not in TOLD)
+    return replace(sequence, notes=(*notes, *sequence.notes), not_carried=left)
 
 
 def read_listed(

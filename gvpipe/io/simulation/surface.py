@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Bool, Floats, Int32, Int64
-from gvpipe.io.left_behind import LeftBehind
-from gvpipe.io.mesh import as_polygons, fan
-from gvpipe.io.simulation.cells import (
+from gvpipe.grids.cells import (
     HIGHER_ORDER,
     OUTLINES,
     POINTS_AND_LINES,
@@ -28,6 +26,8 @@ from gvpipe.io.simulation.cells import (
     VOLUMES,
     Cells,
 )
+from gvpipe.io.left_behind import LeftBehind
+from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.mesh.unique_rows import row_ids
 
 QUADRATIC_POLYGON = 36
@@ -43,6 +43,7 @@ class Surface:
         polygons: corners of each polygon, as of `gvpipe.MeshSequence`.
         cells: ``(T,)`` the grid's cell of each triangle, rising.
         not_carried: what a surface cannot have, by name.
+        without_inside: the same without volume cells and inner points.
     """
 
     points: Int64
@@ -50,6 +51,7 @@ class Surface:
     polygons: Int32 | None
     cells: Int64
     not_carried: tuple[str, ...]
+    without_inside: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +89,10 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
     number = np.zeros(len(points), np.int64)
     number[used] = np.arange(len(used))
     faces = number[nodes][fan(counts)].astype(np.int32)
-    left = _left_behind(cells, used, n_covered)
-    return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), left)
+    left = _left_behind(cells, n_covered)
+    without_inside = left.names
+    _add_inside(left, cells, used)
+    return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), left.names, without_inside)
 
 
 def _check_types(cells: Cells) -> None:
@@ -100,17 +104,21 @@ def _check_types(cells: Cells) -> None:
         raise ValueError(f"{count} of its cells are {name}, which are not read; save its surface (Extract Surface in ParaView)")
 
 
-def _left_behind(cells: Cells, used: Int64, n_covered: int) -> tuple[str, ...]:
-    """Cells that a surface has no place for, and what is inside of volume cells."""
+def _left_behind(cells: Cells, n_covered: int) -> LeftBehind:
+    """Cells that neither a surface nor a volume has a place for."""
     left = LeftBehind()
     left.add("points and lines", int(np.isin(cells.types, list(POINTS_AND_LINES)).sum()))
     left.add("flat cells that are faces of volume cells", n_covered)
     left.add("curvature of cells of higher order", int(np.isin(cells.types, list(HIGHER_ORDER)).sum()))
+    return left
+
+
+def _add_inside(left: LeftBehind, cells: Cells, used: Int64) -> None:
+    """Note what lies inside of the surface."""
     is_solid = np.isin(cells.types, list(VOLUMES))
     left.add("volume cells", int(is_solid.sum()))
     nodes = np.unique(cells.nodes[np.repeat(is_solid, cells.sizes)])
     left.add("inner points", len(np.setdiff1d(nodes, used, assume_unique=True)))
-    return left.names
 
 
 def _flat_faces(cells: Cells) -> list[_Faces]:

@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from gvpipe.foundation.arrays import Array, Float64
 from gvpipe.foundation.errors import InputError
+from gvpipe.grids.cells import Cells, join_cells, structured_cells
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
-from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xml_grids import POLY_CELLS, as_points

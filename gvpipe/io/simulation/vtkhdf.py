@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats, Int64
+from gvpipe.grids.cells import Cells, join_cells
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
-from gvpipe.io.simulation.cells import Cells, join_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.steps import read_steps

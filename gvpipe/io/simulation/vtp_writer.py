@@ -14,7 +14,7 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float32
 from gvpipe.io.mesh import FrameEncoder
-from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
+from gvpipe.io.simulation.poly_content import PolyContent, poly_content
 from gvpipe.io.simulation.xml_arrays import TYPES
 from gvpipe.model.sequence import MeshSequence
 
@@ -23,7 +23,7 @@ LEVEL = 1  # of compression: level 6 takes three to six times as long, and saves
 NAMES = {np.dtype(code): name for name, code in TYPES.items()}
 
 
-class _Appended:
+class Appended:
     """The bytes behind the XML, and the elements that refer to them."""
 
     def __init__(self) -> None:
@@ -57,14 +57,14 @@ def encode_vtp(sequence: MeshSequence, name: str) -> FrameEncoder:
 
 def vtp_bytes(content: PolyContent, points: Array, fields: Mapping[str, Array]) -> bytes:
     """One frame as a whole file; ``fields`` are its values ``(R, C)`` by name."""
-    appended = _Appended()
+    appended = Appended()
     groups = []
     for tag, domain in (("PointData", "vertex"), ("CellData", "triangle")):
         arrays = content.still(domain)
         arrays |= {key: content.rows(one, fields[key][None])[0] for key, one in content.moving(domain).items()}
-        named = {role: content.role(domain, kind) for kind, role in ROLES.items()}
-        roles = "".join(f" {role}={quoteattr(key)}" for role, key in named.items() if key)
-        groups.append(f"<{tag}{roles}>{''.join(appended.element(key, each) for key, each in arrays.items())}</{tag}>")
+        groups.append(
+            f"<{tag}{content.roles(domain)}>{''.join(appended.element(key, each) for key, each in arrays.items())}</{tag}>"
+        )
     place = appended.element("Points", points)
     # 32 bits where they are enough, which VTK reads as they are
     integer = np.int32 if len(content.nodes) < 1 << 31 else np.int64

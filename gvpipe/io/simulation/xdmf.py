@@ -15,10 +15,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
+from gvpipe.grids.cells import SIZES, Cells, equal_cells
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
-from gvpipe.io.simulation.cells import SIZES, Cells, equal_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xdmf_items import Items

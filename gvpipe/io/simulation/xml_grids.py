@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats
+from gvpipe.grids.cells import Cells, join_cells, structured_cells
 from gvpipe.io.left_behind import LeftBehind
-from gvpipe.io.simulation.cells import Cells, join_cells, structured_cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, join_arrays, text_array
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file

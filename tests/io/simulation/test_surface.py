@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gvpipe.foundation.arrays import Array
-from gvpipe.io.simulation.cells import VOLUMES, Cells, equal_cells, join_cells, structured_cells
+from gvpipe.grids.cells import VOLUMES, Cells, equal_cells, join_cells, structured_cells
 from gvpipe.io.simulation.surface import Surface, extract_surface
 
 CORNERS = {

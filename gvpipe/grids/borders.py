@@ -1,0 +1,90 @@
+"""Where cells meet, and where they end: faces that two cells share, and the cell behind each polygon of a surface."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.grids.cells import VOLUMES, Cells
+from gvpipe.mesh.unique_rows import row_ids
+
+
+class FaceList(NamedTuple):
+    """Faces of cells: ``nodes (N, width)`` rising, -1 behind those of a short face, and the cell of each."""
+
+    nodes: Int32
+    cells: Int32
+
+
+def faces_of(cells: Cells, width: int = 3) -> FaceList:
+    """The faces of all volume cells, in the order of types and then of cells, in rows of ``width`` or as many as they need."""
+    kinds = [kind for kind in VOLUMES if (cells.types == kind).any()]
+    width = max([width, *(len(face) for kind in kinds for face in VOLUMES[kind])])
+    nodes, owners = [np.zeros((0, width), np.int32)], [np.zeros(0, np.int32)]
+    for kind in kinds:
+        at = np.flatnonzero(cells.types == kind)
+        for face in VOLUMES[kind]:
+            nodes.append(_padded(cells.nodes[cells.offsets[at, None] + np.array(face)], width))
+            owners.append(at.astype(np.int32))
+    return FaceList(np.concatenate(nodes), np.concatenate(owners))
+
+
+def cells_behind(cells: Cells, faces: Int32, polygons: Int32 | None) -> Int64:
+    """``(P,)`` the cell that each polygon of a surface is a face of, -1 for none.
+
+    Args:
+        cells: whose nodes are numbered as the surface's vertices are.
+        faces: ``(T, 3)`` triangles.
+        polygons: ``(P,)`` corners of each polygon; None: all are triangles.
+    """
+    counts = np.full(len(faces), 3) if polygons is None else polygons.astype(np.int64)
+    known = faces_of(cells, 3 if polygons is None else 4)
+    outlines = _outlines(faces, counts, known.nodes.shape[1])
+    ids, _ = row_ids(np.concatenate([known.nodes, outlines]))
+    cell = np.full(int(ids.max(initial=-1)) + 1, -1, np.int64)
+    cell[ids[: len(known.nodes)]] = known.cells
+    return cell[ids[len(known.nodes) :]]
+
+
+def cell_edges(cells: Cells) -> Int64:
+    """``(E, 2)`` pairs of cells that share a face."""
+    known = faces_of(cells)
+    ids, _ = row_ids(known.nodes)
+    order = np.argsort(ids, kind="stable")
+    same = np.flatnonzero(ids[order][1:] == ids[order][:-1])
+    return np.stack([known.cells[order[same]], known.cells[order[same + 1]]], axis=1).astype(np.int64)
+
+
+def node_edges(cells: Cells) -> Int64:
+    """``(E, 2)`` pairs of nodes that follow each other around a face of a volume cell."""
+    pairs = [np.zeros((0, 2), np.int64)]
+    for kind, faces in VOLUMES.items():
+        at = np.flatnonzero(cells.types == kind)
+        ends = {tuple(sorted(pair)) for face in faces for pair in zip(face, face[1:] + face[:1], strict=True)}
+        for a, b in sorted(ends) if len(at) else ():
+            pairs.append(np.stack([cells.nodes[cells.offsets[at] + a], cells.nodes[cells.offsets[at] + b]], axis=1))
+    return np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+
+
+def inner_edges(edges: Int64, n_surface: int) -> Int64:
+    """Pairs of nodes that are both behind the surface's, by their numbers among these."""
+    return edges[(edges >= n_surface).all(axis=1)] - n_surface
+
+
+def _outlines(faces: Int32, counts: Int64, width: int) -> Int32:
+    """The corners of each polygon as rows of a `FaceList`; polygons of more corners than any face are rows of -1."""
+    starts = np.cumsum(counts - 2) - (counts - 2)
+    rows = np.full((len(counts), width), -1, np.int32)
+    for size in np.unique(counts[counts <= width]).tolist():
+        at = np.flatnonzero(counts == size)
+        fans = faces[starts[at, None] + np.arange(size - 2)]  # (n, size - 2, 3)
+        rows[at] = _padded(np.concatenate([fans[:, 0], fans[:, 1:, 2]], axis=1), width)
+    return rows
+
+
+def _padded(nodes: Array, width: int) -> Int32:
+    rows = np.full((len(nodes), width), -1, np.int32)
+    rows[:, : nodes.shape[1]] = np.sort(nodes, axis=1)
+    return rows
