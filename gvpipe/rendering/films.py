@@ -130,8 +130,8 @@ class PictureOptions:
         plain: leave out materials and colours.
 
     Raises:
-        InputError: an ``error_max`` that is not above 0; a field beside errors; a colour map, range or log scale without a field;
-            a range that cannot be.
+        InputError: an ``error_max`` that is not above 0; a field beside errors; a colour map, a range or a log scale without
+            a field; a range that cannot be.
     """
 
     frame: int | None = None

@@ -101,7 +101,7 @@ def export_html(
         convert: encode the file anew in any case, in the profile that all browsers play.
         field: name of a field; the page opens with colours of its values, or of its vectors' lengths. None: materials.
         colormap: of the field: ``"viridis"`` (default), ``"magma"``, ``"coolwarm"`` or ``"gray"``.
-        field_range: the values at the ends of the colours; ``"2%,98%"``: these percentiles of all frames; ``"symmetric"``: about 0.
+        field_range: the values at the ends of the colours; ``"2%,98%"``: percentiles of all frames; ``"symmetric"``: about 0.
         log: let colours follow the logarithm of the field; what is not above 0 is grey.
         speed: 0.0625 to 16; 1 is the video's own.
         warp: ``"NAME"`` or ``"NAME:SCALE"``: a field of vectors on vertices that moves them, so many times as far.

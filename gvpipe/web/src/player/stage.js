@@ -7,6 +7,7 @@ import {
   Matrix4,
   PMREMGenerator,
   PerspectiveCamera,
+  Ray,
   Scene,
   Spherical,
   Vector3,
@@ -20,8 +21,8 @@ const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const FAR = 100; // balls that the motion fits in, at least
 const MARGIN = 1.06; // around what is framed
 const FOLLOWING_ROOM = 1.15; // around a mesh that is followed, which may stretch out later
-const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
-const ELEVATION = Math.PI / 12;
+const VIEW = [180 / 7, 15]; // azimuth and elevation of the first view, degrees: from the front, a little from the right and above
+const STEEPEST = 89.9; // degrees of elevation: from straight above no azimuth would be left
 const MAX_PIXEL_RATIO = 2;
 const MAX_ANISOTROPY = 8; // of textures seen at a flat angle
 const ROOM_PIXELS = 64; // a side of what metal reflects
@@ -47,6 +48,7 @@ export class Stage {
     this.controls.addEventListener("start", () => (this.isFramed = false));
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
+    this.view = VIEW;
     this.mesh = null;
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
@@ -97,6 +99,33 @@ export class Stage {
     this.requestRender();
   }
 
+  setFlatShading(isFlat) {
+    this.mesh?.setFlatShading(isFlat);
+    this.requestRender();
+  }
+
+  /** Where the first view looks from. @param {[number, number]|null} view azimuth and elevation, degrees, as of `gvpipe.render` */
+  setView(view) {
+    this.view = view ?? VIEW;
+    if (this.mesh) this.resetView();
+  }
+
+  /** Move vertices by a field (`GeometryVideoMesh.setWarp`). */
+  async setWarp(name, scale) {
+    const { mesh } = this;
+    if ((await mesh.setWarp(name, scale)) && mesh === this.mesh) this.#frameShown();
+  }
+
+  /** What is seen at a point of the picture (`GeometryVideoMesh.pick`). @param {number} x @param {number} y CSS pixels, from its upper left */
+  pick(x, y) {
+    const { camera } = this;
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement;
+    camera.updateMatrixWorld();
+    const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+    const beyond = new Vector3((2 * x) / width - 1, 1 - (2 * y) / height, 0.5).unproject(camera);
+    return this.mesh.pick(new Ray(origin, beyond.sub(origin)));
+  }
+
   /** Show a field in colours (`GeometryVideoMesh.showField`). */
   async showField(name, options) {
     const range = await this.mesh.showField(name, options);
@@ -117,13 +146,15 @@ export class Stage {
     if (this.mesh) this.resetView();
   }
 
-  /** Look from the front at the whole motion, or at the mesh that is followed. */
+  /** Look from where the first view does at the whole motion, or at the mesh that is followed. */
   resetView() {
     const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
     const front = new Vector3(...upright.slice(0, 3));
     const up = new Vector3(...upright.slice(3));
-    const direction = front.multiplyScalar(Math.cos(ELEVATION)).addScaledVector(up, Math.sin(ELEVATION));
-    direction.applyAxisAngle(up, AZIMUTH);
+    const [azimuth, steep] = this.view;
+    const [turn, rise] = [azimuth, Math.min(STEEPEST, Math.max(-STEEPEST, steep))].map((degrees) => (degrees * Math.PI) / 180);
+    const direction = front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise));
+    direction.applyAxisAngle(up, turn);
     this.box = this.#motion();
     this.middle = this.isFollowing ? this.#findMiddle() : this.box.getCenter(new Vector3());
     const half = this.isFollowing ? this.#findReach(this.middle) : this.box.getSize(new Vector3()).divideScalar(2).toArray();
@@ -202,7 +233,7 @@ export class Stage {
   /** The box of the motion, as far as it is known, in the scene. */
   #motion() {
     const { centre, scale } = this;
-    const { min, max } = this.mesh.video.bounds;
+    const { min, max } = this.mesh.bounds;
     const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
     return new Box3(low, high);
   }
