@@ -29,7 +29,7 @@ export class Legend {
     const values = Array.from({ length: TICKS }, (_, i) => at(i / (TICKS - 1)));
     const items = (high > low ? values : [low]).map((value) => {
       const item = document.createElement("li");
-      item.textContent = formatNumber(value, isLog ? value : high - low);
+      item.textContent = isLog ? String(Number(value.toPrecision(3))) : formatNumber(value, high - low);
       return item;
     });
     this.ticks.replaceChildren(...items);

@@ -1,6 +1,6 @@
 /** A value of a field over time: at most so many frames, spread evenly, the first and the last among them. */
 
-import { length } from "../three/field_colours.js";
+import { length } from "../fields/length.js";
 
 const MOST = 200;
 

@@ -10,6 +10,7 @@ import {
   MeshLambertMaterial,
   SRGBColorSpace,
 } from "three";
+import { length } from "../fields/length.js";
 import { HOLE, SIZE, colourTable } from "./colormaps.js";
 import { OFFSET } from "./materials.js";
 import { toLinear } from "./vertex_attributes.js";
@@ -134,10 +135,4 @@ function mapTexture(colormap) {
   texture.wrapS = texture.wrapT = ClampToEdgeWrapping;
   texture.needsUpdate = true;
   return texture;
-}
-
-export function length(values, start, components) {
-  let sum = 0;
-  for (let i = start; i < start + components; i++) sum += values[i] * values[i];
-  return Math.sqrt(sum);
 }
