@@ -398,7 +398,10 @@ export class GeometryVideoElement extends Base {
     mesh.addEventListener("levelchange", ({ level }) => {
       this.#bar.setVideo(this.video);
       this.#probe.close(); // it has other vertices
-      if (level === 0) this.#showField();
+      if (level === 0) {
+        this.#showField();
+        this.#showWarp();
+      }
       this.#tell("levelchange", level);
     });
     for (const name of ["progress", "durationchange"]) {
