@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from asset_files import write_asset
-from pages import LOAD
+from pages import LOAD, run
 from shots import SHOT, Shot, hue
 
 import gvpipe
@@ -217,11 +217,35 @@ def test_the_probe_closes_and_drags_do_not_open_it(player: Player, site: Site) -
     assert player(f"{CLICK} return [await click([0.5, 0.5, 0], 40), box.hidden];") == [None, True]
     assert player(f"{CLICK} await click([0.5, 0.5, 0]); return box.hidden;") is False
     assert player(f"{CLICK} await click([5, 0.5, 0]); return box.hidden;") is True  # beside the mesh
+    before = shot(player, f"{CLICK} element.shadowRoot.querySelector('canvas').focus();").pixels
+    assert np.array_equal(shot(player, f"{CLICK} await click([0.5, 0.5, 0]);").pixels, before)  # a still has no mark
     press = "canvas.dispatchEvent(new KeyboardEvent('keydown', { key: args[0], bubbles: true }));"
     assert player(f"{CLICK} {press} await new Promise((go) => setTimeout(go, 100)); return box.hidden;", "v") is False
     assert player(f"{CLICK} {press} return box.hidden;", "Escape") is True
     assert player(f"{CLICK} await click([0.5, 0.5, 0]); box.querySelector('button').click(); return box.hidden;") is True
     assert player(f"{CLICK} await click([0.5, 0.5, 0]); await element.load(); return box.hidden;") is True
+
+
+def test_a_page_opens_as_asked_for(browser: Any, site: Site) -> None:
+    """From a disk: its camera, its colours between percentiles, its warp and its speed."""
+    write_asset(site[0] / "view.mp4", panel())
+    page = site[0] / "opened.html"
+    view: dict[str, Any] = {"field": "stress", "field_range": "10%,90%", "warp": "U:2", "camera": "left", "speed": 0.5}
+    gvpipe.export_html(site[0] / "view.mp4", page, **view)
+    browser.get(page.as_uri())
+    element = "const element = document.querySelector('geometry-video');"
+    wait = "if (element.readyState < 4) await new Promise((go) => element.addEventListener('ready', go, { once: true }));"
+    seen = Shot(*run(browser, f"{element} {wait} await element.seek(2); {SHOT}"))
+    legend = "return [...element.shadowRoot.querySelectorAll('.legend li')].map((item) => Number(item.innerText))"
+    low, _, high = run(browser, f"{element} {legend}")
+    values = panel().fields["stress"][:].astype(float)
+    wanted = np.percentile(values, [10, 90], method="lower")
+    assert (low, high) == pytest.approx(tuple(wanted), rel=0.01, abs=0.5)
+    assert run(browser, f"{element} return [element.playbackRate, element.warp, element.camera]") == [
+        0.5, {"name": "U", "scale": 2}, [90, 0],
+    ]  # fmt: skip
+    moved = panel()[2] + 2 * panel().fields["U"][2]
+    assert seen(*(moved[12] + [0, 0.02, 0]))[3] == 255 and seen(0.5, 0.5, 0.0)[3] == 0
 
 
 def test_the_probe_sees_what_is_there(player: Player, site: Site) -> None:

@@ -101,7 +101,7 @@ export class GeometryVideoElement extends Base {
       hide: (names) => this.hide(names),
     });
     this.#legend = new Legend(root.querySelector(".legend"));
-    this.#probe = new Probe(root.querySelector(".probe"));
+    this.#probe = new Probe(root.querySelector(".probe"), (vertex) => this.#stage?.setMark(vertex));
     this.#bar.setEnabled(false);
     root.addEventListener("keydown", (event) => this.#onKey(event));
     listenToClicks(root.querySelector(".stage"), (x, y) => this.#pick(x, y));
@@ -395,6 +395,7 @@ export class GeometryVideoElement extends Base {
       this.#probe.setFrame(frame);
       this.#tell("frame", frame);
     });
+    mesh.addEventListener("change", () => this.#probe.setFrame(mesh.currentFrame)); // late values of a field
     mesh.addEventListener("levelchange", ({ level }) => {
       this.#bar.setVideo(this.video);
       this.#probe.close(); // it has other vertices

@@ -19,11 +19,13 @@ export class Probe {
   #picked = null;
   #frame = 0;
   #isPlaying = false;
+  #mark;
 
-  /** @param {HTMLElement} root filled with the box */
-  constructor(root) {
+  /** @param {HTMLElement} root filled with the box @param {(vertex: number|null) => void} mark called with what is probed, or null */
+  constructor(root, mark) {
     root.innerHTML = MARKUP;
     this.root = root;
+    this.#mark = mark;
     [this.value, this.place, this.ends] = root.querySelectorAll("p");
     this.plot = root.querySelector("svg");
     [this.mark, this.line] = root.querySelectorAll("path");
@@ -48,6 +50,7 @@ export class Probe {
     this.#picked = picked;
     this.#frame = frame;
     this.root.hidden = false;
+    this.#mark(picked.vertex);
     this.setField(field);
     if (!this.#field) return null;
     await this.#field.load(frame);
@@ -60,6 +63,7 @@ export class Probe {
     this.#trace?.end();
     this.#trace = this.#field = this.#picked = null;
     this.root.hidden = true;
+    this.#mark(null);
   }
 
   /** Another field is shown, or none. */

@@ -2,11 +2,15 @@
 
 import {
   Box3,
+  BufferAttribute,
+  BufferGeometry,
   DirectionalLight,
   HemisphereLight,
   Matrix4,
   PMREMGenerator,
   PerspectiveCamera,
+  Points,
+  PointsMaterial,
   Ray,
   Scene,
   Spherical,
@@ -25,6 +29,7 @@ const VIEW = [180 / 7, 15]; // azimuth and elevation of the first view, degrees:
 const STEEPEST = 89.9; // degrees of elevation: from straight above no azimuth would be left
 const MAX_PIXEL_RATIO = 2;
 const MAX_ANISOTROPY = 8; // of textures seen at a flat angle
+const MARK = { color: 0xe0532f, size: 9, sizeAttenuation: false, depthTest: false }; // of a vertex that is pointed at
 const ROOM_PIXELS = 64; // a side of what metal reflects
 const ROOM_BLUR = 0.04; // radians
 const SOFTWARE = /SwiftShader|llvmpipe|softpipe|software|Basic Render/i; // renderers that run on the processor
@@ -50,6 +55,11 @@ export class Stage {
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
     this.view = VIEW;
     this.mesh = null;
+    this.marked = null; // a vertex
+    this.mark = new Points(new BufferGeometry(), new PointsMaterial(MARK));
+    this.mark.geometry.setAttribute("position", new BufferAttribute(new Float32Array(3), 3));
+    Object.assign(this.mark, { visible: false, frustumCulled: false, renderOrder: 1 });
+    this.scene.add(this.mark);
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.size = ""; // of the picture, as it is
@@ -71,7 +81,7 @@ export class Stage {
     if (turn !== this.turn) return mesh.dispose(); // another mesh has come meanwhile, or the stage is closed
     this.mesh = mesh;
     mesh.addEventListener("frame", () => this.#frameShown());
-    mesh.addEventListener("change", () => this.requestRender());
+    mesh.addEventListener("change", () => this.setMark(this.marked));
     mesh.addEventListener("levelchange", () => this.#findUsed());
     this.#findUsed();
     this.middle = new Vector3();
@@ -124,6 +134,14 @@ export class Stage {
     const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
     const beyond = new Vector3((2 * x) / width - 1, 1 - (2 * y) / height, 0.5).unproject(camera);
     return this.mesh.pick(new Ray(origin, beyond.sub(origin)));
+  }
+
+  /** Mark a vertex of the mesh, or none. @param {number|null} vertex */
+  setMark(vertex) {
+    this.marked = vertex;
+    this.mark.visible = vertex !== null && this.mesh !== null;
+    if (this.mark.visible) this.mark.position.fromArray(this.mesh.framePositions, 3 * vertex);
+    this.requestRender();
   }
 
   /** Show a field in colours (`GeometryVideoMesh.showField`). */
@@ -193,10 +211,13 @@ export class Stage {
     });
   }
 
-  /** The picture drawn anew, as a promise of a PNG file. */
+  /** The picture drawn anew, without a mark, as a promise of a PNG file. */
   still() {
+    this.mark.visible = false;
     this.renderer.render(this.scene, this.camera); // what was drawn before is gone once it is on the screen
-    return new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+    const picture = new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+    this.setMark(this.marked);
+    return picture;
   }
 
   clear() {
@@ -204,7 +225,8 @@ export class Stage {
       this.scene.remove(this.mesh);
       this.mesh.dispose();
     }
-    this.mesh = null;
+    this.mesh = this.marked = null;
+    this.mark.visible = false;
     this.isFramed = false;
     this.requestRender();
   }
@@ -216,6 +238,8 @@ export class Stage {
     this.observer.disconnect();
     this.controls.dispose();
     this.reflected?.dispose();
+    this.mark.geometry.dispose();
+    this.mark.material.dispose();
     this.renderer.dispose();
   }
 
@@ -267,7 +291,7 @@ export class Stage {
   #frameShown() {
     if (this.isFollowing) this.#follow(this.#findMiddle());
     else if (this.isFramed && !this.box.containsBox(this.#motion())) this.resetView(); // the motion goes farther than was known
-    this.requestRender();
+    this.setMark(this.marked);
   }
 
   #follow(middle) {
