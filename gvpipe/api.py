@@ -408,6 +408,7 @@ def render(
     field: str | None = None,
     colormap: str | None = None,
     field_range: tuple[float, float] | str | None = None,
+    log: bool = False,
     parts: str | Sequence[str] = (),
     plain: bool = False,
     clip: str | None = None,
@@ -437,7 +438,9 @@ def render(
         camera: instead of the one that frames the whole motion from ``view``.
         field: name of a field; colours then show its values, or its vectors' lengths, with a legend. What has no value is grey.
         colormap: of the field: ``"viridis"`` (default), ``"magma"``, ``"coolwarm"``, ``"gray"`` or ``"errors"``.
-        field_range: the values at the ends of the colours; ``"symmetric"``: about 0. By default the range of the frames drawn.
+        field_range: the values at the ends of the colours; ``"2%,98%"``: percentiles of the frames drawn; ``"symmetric"``:
+            about 0. By default the range of the frames drawn.
+        log: let colours follow the logarithm of the field; what is not above 0 is grey.
         parts: the name of the part to paint, or several; none: all.
         plain: paint the shape alone, without materials and colours.
         clip, mesh, frames, fps: of the source, as for `read`.
@@ -467,6 +470,7 @@ def render(
         field=field,
         colormap=colormap,
         limits=field_range,
+        log=log,
         parts=(parts,) if isinstance(parts, str) else tuple(parts),
         plain=plain,
     )

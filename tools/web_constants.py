@@ -63,6 +63,7 @@ SHARED = {
     "gvpipe.media.video": "MAX_SIDE PROFILES",
     "gvpipe.mesh.hierarchy": "MAX_WAVES PEAK_PER_VERTEX PEAK_PER_TRIANGLE KEPT_PER_VERTEX KEPT_PER_TRIANGLE SECONDS_PER_VERTEX "
     "SECONDS_PER_TRIANGLE",
+    "gvpipe.model.warp": "USUAL",
     "gvpipe.rasterizer.colormaps": "MAGMA VIRIDIS",
     "gvpipe.coding.repeated_frames": "SECTION",
     "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE BYTES_PER_VALUE SECONDS_PER_VALUE "

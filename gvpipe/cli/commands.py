@@ -23,6 +23,7 @@ from gvpipe.cli.console import Output, compress_option, is_verbose, output_optio
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
 from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_settings
+from gvpipe.cli.page_options import page_options
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, collect_seldom, ending_by_exception, replace_closed_streams
 from gvpipe.foundation.atomic import remove_abandoned_folders
@@ -470,11 +471,10 @@ cli.add_command(plot)
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
 @click.option("--convert", is_flag=True, help="Encode the file anew, in the profile that all browsers play.")
 @click.option("--quality", type=float, help="0-100, of a conversion: the error that it may add. [default: 90]")
+@page_options
 @unlimited_option
 @output_options
-def export_html(
-    source: str, target: str, up: str | None, convert: bool, quality: float | None, unlimited: bool, out: Output
-) -> None:
+def export_html(source: str, target: str, up: str | None, quality: float | None, out: Output, **options: Any) -> None:
     """Write a web page of one file that plays a geometry video, without a network.
 
     The page holds the file as it is. 10-bit pictures (profile precise) play in Chromium alone; --convert makes a page for all
@@ -483,7 +483,7 @@ def export_html(
     from gvpipe import web
 
     with source_path(source) as path, out.progress() as progress:
-        report = web.export_html(path, target, up, quality, progress, convert=convert, unlimited=unlimited)
+        report = web.export_html(path, target, up, quality, progress, **options)
     out.json(report.to_json())
     size = f"{_size(report.bytes)}, {_size(report.video_bytes)} of which are the geometry video"
     out.text(f"{shown(source, STDIN)} -> {target} ({size})")
@@ -493,9 +493,10 @@ def export_html(
 @cli.command()
 @click.argument("source", metavar="FILE.mp4")
 @click.option("--up", type=click.Choice(["y", "z"]), help="The axis that stands upright. [default: the file's own, else y]")
+@page_options
 @unlimited_option
 @output_options
-def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
+def play(source: str, up: str | None, out: Output, **options: Any) -> None:
     """Play a geometry video in your browser.
 
     Where no browser can be opened, the page's path is printed. The page is one file and needs no network. Pages that are older
@@ -509,7 +510,7 @@ def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
 
     with source_path(source) as path, lasting_folder() as folder, out.progress() as progress:
         page = Path(folder) / f"{Path(path).stem}.html"  # stays: the browser reads it later
-        report = web.export_html(path, page, up, None, progress, unlimited=unlimited)
+        report = web.export_html(path, page, up, None, progress, **options)
     _tell_conversion(out, report)
     is_open = open_page(page)
     if not is_open:
@@ -534,7 +535,13 @@ def play(source: str, up: str | None, unlimited: bool, out: Output) -> None:
 @click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True)
 @click.option("--field", metavar="NAME", help="Colour by a field's values; vectors by their length.")
 @click.option("--colormap", metavar="NAME", help="viridis, magma, coolwarm, gray or errors. [default: viridis]")
-@click.option("--range", "limits", metavar="A,B", help="Ends of the colours, or symmetric. [default: the range drawn]")
+@click.option(
+    "--range",
+    "limits",
+    metavar="A,B",
+    help="Ends of the colours, percentiles (2%,98%) or symmetric. [default: the range drawn]",
+)
+@click.option("--log", is_flag=True, help="Let colours follow the field's logarithm; what is not above 0 is grey.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Paint this part only; repeat for more.")
 @click.option("--plain", "--no-textures", "plain", is_flag=True, help="Leave out materials, textures and colours.")
 @click.option("--clip", metavar="NAME", help="The animation to paint, of a file that has several. [default: the first]")
@@ -547,7 +554,7 @@ def render(source: str, target: str, size: str, limits: str | None, frames: str 
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
     from gvpipe import api
     from gvpipe.cli.choices import parse_frames
-    from gvpipe.rendering.field_map import parse_range
+    from gvpipe.rendering.field_range import parse_range
     from gvpipe.rendering.films import parse_size
 
     if options["error_max"] is not None and not options["error_of"]:

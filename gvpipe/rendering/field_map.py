@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,10 +13,8 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import used_vertices
 from gvpipe.rasterizer.colormaps import colormap
-from gvpipe.rendering.legend import paint_legend, round_ticks
-
-SYMMETRIC = "symmetric"
-Range = tuple[float, float] | str | None
+from gvpipe.rendering.field_range import Ends, Range, checked_range, ends_of
+from gvpipe.rendering.legend import log_ticks, paint_legend, round_ticks
 
 
 class FieldMap:
@@ -28,22 +25,31 @@ class FieldMap:
         name: of the field; one of several components is shown by its magnitude.
         frames: that are drawn.
         colors: a colour map, of `gvpipe.rasterizer.colormaps.COLORMAPS`.
-        limits: the range's ends; ``"symmetric"``: about 0, to the largest absolute value; None: from the smallest value to the
-            largest. Both of these count all finite values that are drawn.
+        limits: the range's ends; percentiles, such as ``"2%,98%"``; ``"symmetric"``: about 0, to the largest absolute value;
+            None: from the smallest value to the largest. All but the first count all finite values that are drawn
+            (`gvpipe.rendering.field_range`).
+        log: let colours follow the logarithm; values of 0 and below then count for nothing, and show as none.
 
     Raises:
-        InputError: there is no such field or colour map; a range that cannot be.
+        InputError: there is no such field or colour map; a range that cannot be; a log scale without a value above 0.
     """
 
     def __init__(
-        self, sequence: MeshSequence, name: str, frames: Sequence[int], colors: str = "viridis", limits: Range = None
+        self,
+        sequence: MeshSequence,
+        name: str,
+        frames: Sequence[int],
+        colors: str = "viridis",
+        limits: Range = None,
+        *,
+        log: bool = False,
     ) -> None:
         if name not in sequence.fields:
             known = f"there are: {', '.join(sequence.fields)}" if sequence.fields else "there are none"
             raise InputError(f"{sequence.name}: field {name!r} asked for; {known}{did_you_mean(name, sequence.fields)}")
         self._field: Field = sequence.fields[name]
-        self._name, self._ramp = name, colormap(colors)
-        self.limits = _checked(limits) if isinstance(limits, tuple) else self._limits_of(sequence, frames, limits)
+        self._name, self._log, self._ramp = name, log, colormap(colors)
+        self.limits = self._limits_of(sequence, frames, limits)
 
     def numbers(self, frame: int) -> Float64:
         """``(R,)`` values, or magnitudes, of vertices or triangles; NaN where there is none."""
@@ -57,6 +63,9 @@ class FieldMap:
         low, high = self.limits
         numbers = self.numbers(frame)
         numbers[np.isinf(numbers)] = np.nan
+        if self._log:
+            low, high = np.log([low, high])
+            numbers = np.log(numbers, out=np.full_like(numbers, np.nan), where=numbers > 0)
         parts = (numbers - low) / (high - low) if high > low else np.where(np.isnan(numbers), np.nan, 0.5)
         return np.asarray(parts[:, None] if self._field.domain == "triangle" else parts)
 
@@ -68,43 +77,22 @@ class FieldMap:
         """
         title = f"|{self._name}|" if self._field.n_components > 1 else self._name
         titles = [f"{title},", self._field.unit] if self._field.unit else ["", title]
-        return paint_legend(size, titles, round_ticks(*self.limits), self._ramp)
+        ticks = log_ticks(*self.limits) if self._log else round_ticks(*self.limits)
+        return paint_legend(size, titles, ticks, self._ramp)
 
-    def _limits_of(self, sequence: MeshSequence, frames: Sequence[int], limits: str | None) -> tuple[float, float]:
-        """Smallest and largest finite value of what is drawn; 0 and 0 where there is none."""
-        if limits not in (None, SYMMETRIC):
-            raise InputError(f"range {limits!r}; two numbers such as 0,250 or {SYMMETRIC!r} is needed")
-        rows: Array | slice = used_vertices(sequence) if self._field.domain == "vertex" else slice(None)
-        low, high = math.inf, -math.inf
-        for frame in sorted(set(frames)):
-            numbers = self.numbers(frame)[rows]
-            numbers = numbers[np.isfinite(numbers)]
-            low, high = min(low, float(numbers.min(initial=math.inf))), max(high, float(numbers.max(initial=-math.inf)))
-        if low > high:
-            return 0.0, 0.0
-        largest = max(abs(low), abs(high))
-        return (-largest, largest) if limits == SYMMETRIC else (low, high)
+    def _limits_of(self, sequence: MeshSequence, frames: Sequence[int], limits: Range) -> Ends:
+        """The range's ends; 0 and 0 where no finite value is drawn."""
+        wanted = checked_range(limits, log=self._log)
+        if isinstance(wanted, tuple):
+            return wanted
+        by_vertex = self._field.domain == "vertex" and len(sequence.faces)
+        rows: Array | slice = used_vertices(sequence) if by_vertex else slice(None)
 
+        def numbers(frame: int) -> Float64:
+            drawn: Float64 = self.numbers(frame)[rows]
+            return drawn[drawn > 0] if self._log else drawn
 
-def parse_range(text: str) -> tuple[float, float] | str:
-    """Return the ends of ``"0,250"``, or ``"symmetric"``.
-
-    Raises:
-        InputError: neither.
-    """
-    if text == SYMMETRIC:
-        return text
-    try:
-        low, high = (float(part) for part in text.split(","))
-    except ValueError as exc:
-        raise InputError(f"range {text!r}; two numbers such as 0,250 or {SYMMETRIC!r} is needed") from exc
-    return _checked((low, high))
-
-
-def _checked(limits: tuple[float, ...]) -> tuple[float, float]:
-    if len(limits) != 2 or not all(math.isfinite(end) for end in limits):
-        raise InputError(f"a range of {limits}; two finite numbers are needed")
-    low, high = float(limits[0]), float(limits[1])
-    if not low < high:
-        raise InputError(f"a range from {low:g} to {high:g}; the first number must be below the second")
-    return low, high
+        found = ends_of(numbers, frames, wanted)
+        if found is None and self._log:
+            raise InputError(f"{sequence.name}: field {self._name!r} has no value above 0 to show; leave out the log scale")
+        return found or (0.0, 0.0)

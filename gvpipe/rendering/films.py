@@ -23,7 +23,8 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
 from gvpipe.rendering.error_map import ErrorMap
-from gvpipe.rendering.field_map import FieldMap, Range
+from gvpipe.rendering.field_map import FieldMap
+from gvpipe.rendering.field_range import Range, checked_range
 from gvpipe.rendering.legend import widen_for_time, write_time
 from gvpipe.rendering.picture_files import STILL, WRITERS
 from gvpipe.runtime.forks import kept
@@ -31,6 +32,7 @@ from gvpipe.runtime.forks import kept
 STILL_SAMPLES, FILM_SAMPLES = 3, 2  # per pixel and axis
 TURN_SECONDS = 4.0  # a turntable's shortest turn
 DEFAULT_COLORMAP = "viridis"
+WITHOUT_FIELD = "a colour map, a range or a log scale is given without a field; name one (field, --field)"
 
 
 class ColourMap(Protocol):
@@ -123,11 +125,13 @@ class PictureOptions:
         field: the name of a field whose values colours show, or None.
         colormap: of the field, or None for `DEFAULT_COLORMAP`.
         limits: of the field's colours; see `gvpipe.rendering.field_map.FieldMap`.
+        log: whether the field's colours follow the logarithm.
         parts: names of the parts to paint; none: all.
         plain: leave out materials and colours.
 
     Raises:
-        InputError: an ``error_max`` that is not above 0; a field beside errors; a colour map or a range without a field.
+        InputError: an ``error_max`` that is not above 0; a field beside errors; a colour map, a range or a log scale without
+            a field; a range that cannot be.
     """
 
     frame: int | None = None
@@ -142,14 +146,16 @@ class PictureOptions:
     field: str | None = None
     colormap: str | None = None
     limits: Range = None
+    log: bool = False
     parts: tuple[str, ...] = ()
     plain: bool = False
 
     def __post_init__(self) -> None:
         if self.error_max is not None and not (math.isfinite(self.error_max) and self.error_max > 0):
             raise InputError(f"the colours' end is {self.error_max} percent of the diagonal; a number above 0 is needed")
-        if self.field is None and (self.colormap is not None or self.limits is not None):
-            raise InputError("a colour map or a range is given without a field; name one (field, --field)")
+        if self.field is None and (self.colormap is not None or self.limits is not None or self.log):
+            raise InputError(WITHOUT_FIELD)
+        checked_range(self.limits, log=self.log)
 
 
 def write_pictures(
@@ -214,7 +220,7 @@ def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, referenc
         sequence = only_parts(sequence, options.parts)
     if options.field is not None:
         colors = options.colormap or DEFAULT_COLORMAP
-        shown = FieldMap(sequence, options.field, frames, colors, options.limits)
+        shown = FieldMap(sequence, options.field, frames, colors, options.limits, log=options.log)
     legend = shown.legend(options.size) if shown else None
     if legend is not None and sequence.metadata.times:
         legend = widen_for_time(legend, options.size)

@@ -96,3 +96,30 @@ def round_ticks(low: float, high: float) -> dict[float, str]:
     return {
         min(max((number * step - low) / extent, 0.0), 1.0): f"{number * step:.{digits}g}" for number in range(first, last + 1)
     }
+
+
+def log_ticks(low: float, high: float) -> dict[float, str]:
+    """Labels of powers of ten, at most `MOST_TICKS`, by their part of the way from ``low`` to ``high`` on a log scale.
+
+    Between ends so near that fewer than two lie there, 2 and 5 times a power count too, or else the ends.
+
+    Args:
+        low, high: above 0.
+
+    Examples:
+        >>> log_ticks(0.1, 1000)
+        {0.0: '0.1', 0.25: '1', 0.5: '10', 0.75: '100', 1.0: '1000'}
+        >>> list(log_ticks(3, 30).values())
+        ['5', '10', '20']
+    """
+    first, last = math.log10(low), math.log10(high)
+    if not high > low:
+        return {0.0: f"{low:.6g}"}
+    powers = range(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
+    places = [float(power) for power in powers][:: math.ceil(max(len(powers), 1) / MOST_TICKS)]
+    if len(places) < 2:
+        steps = (power + math.log10(factor) for power in range(math.floor(first), math.ceil(last)) for factor in (1, 2, 5))
+        places = [place for place in steps if first - 1e-9 <= place <= last + 1e-9]
+    if len(places) < 2:
+        return {0.0: f"{low:.6g}", 1.0: f"{high:.6g}"}
+    return {min(max((place - first) / (last - first), 0.0), 1.0): f"{10.0**place:.6g}" for place in places}

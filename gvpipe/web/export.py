@@ -33,6 +33,7 @@ from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.rendering.poster import poster_of
 from gvpipe.web.asset_export import carry_asset
+from gvpipe.web.page_view import PageView, page_view
 
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
@@ -78,6 +79,14 @@ def export_html(
     progress: Progress | None = None,
     *,
     convert: bool = False,
+    field: str | None = None,
+    colormap: str | None = None,
+    field_range: tuple[float, float] | str | None = None,
+    log: bool = False,
+    speed: float = 1.0,
+    warp: str | None = None,
+    camera: str | tuple[float, float] | None = None,
+    shading: str = "smooth",
     unlimited: bool = False,
 ) -> ExportReport:
     """Write a page of one file that plays a geometry video.
@@ -90,10 +99,18 @@ def export_html(
             `QUALITY` if None.
         progress: called with a stage's name and the part of it that is done.
         convert: encode the file anew in any case, in the profile that all browsers play.
+        field: name of a field; the page opens with colours of its values, or of its vectors' lengths. None: materials.
+        colormap: of the field: ``"viridis"`` (default), ``"magma"``, ``"coolwarm"`` or ``"gray"``.
+        field_range: the values at the ends of the colours; ``"2%,98%"``: percentiles of all frames; ``"symmetric"``: about 0.
+        log: let colours follow the logarithm of the field; what is not above 0 is grey.
+        speed: 0.0625 to 16; 1 is the video's own.
+        warp: ``"NAME"`` or ``"NAME:SCALE"``: a field of vectors on vertices that moves them, so many times as far.
+        camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
+        shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
 
     Raises:
-        InputError: there is no such file, or an argument cannot be used.
+        InputError: there is no such file or field, or an argument cannot be used.
         FormatError: not a geometry video, or a damaged one.
         OutputError: the page cannot be written; no part of it is left.
     """
@@ -108,12 +125,23 @@ def export_html(
     player = Player(source, unlimited=unlimited)
     if up is None:
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
+    view = page_view(
+        player.sequence(),
+        field=field,
+        colormap=colormap,
+        field_range=field_range,
+        log=log,
+        speed=speed,
+        warp=warp,
+        camera=camera,
+        shading=shading,
+    )
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
         data = (
             Path(player.path).read_bytes() if player.bitstream.layout != BARE and not is_remote(player.path) else _plain(player)
         )
-        return replace(_write_page(player.path, data, target, up), unfinished=player.bitstream.is_unfinished)
+        return replace(_write_page(player.path, data, target, up, view), unfinished=player.bitstream.is_unfinished)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
@@ -121,7 +149,7 @@ def export_html(
     x, y, z = player.bitstream.origin
     bitstream = carry_asset(player, trial.encoded, trial.codec)
     video = bitstream.video or poster_of(player.sequence())
-    page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z), video=video)), target, up)
+    page = _write_page(player.path, file_bytes(replace(bitstream, origin=(x, y, z), video=video)), target, up, view)
     added = trial.errors
     return ExportReport(
         page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg
@@ -156,12 +184,13 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_page(name: str, data: bytes, target: Path, up: str) -> ExportReport:
+def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -> ExportReport:
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
         "TITLE": html.escape(Path(name).stem),
         "UP": up,
+        "VIEW": view.attributes(),
         "NOTICE": (shipped / "LICENSES" / "NOTICE.txt").read_text("utf-8").strip(),
         "DIGITS": DIGITS,
         "PLAYER": _base85(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),

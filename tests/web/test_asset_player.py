@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from asset_files import picture, read_listing, replace_asset, write_asset
-from pages import LOAD, TEXT
-from PIL import Image as Pillow
+from pages import LOAD
+from shots import SHOT, Pixels, Shot, hue
 
 import gvpipe
 from gvpipe import Attribute, Field, Image, Material, Part, Texture
@@ -24,26 +22,9 @@ from gvpipe.model.sequence import MeshSequence
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())]
 RED, GREEN, BLUE, WHITE = [230, 20, 20], [10, 200, 30], [20, 30, 220], [240, 240, 240]
 CHECKS = [[RED, GREEN], [BLUE, WHITE]]  # upper row first
-SHOT = f"""{TEXT} const blob = await element.still();
-    return [text(new Uint8Array(await blob.arrayBuffer())), element.projection];"""
 LOADS = itertools.count()
 Player = Callable[..., Any]
 Site = tuple[Path, str]
-Pixels = npt.NDArray[np.int64]
-
-
-class Shot:
-    """A picture of the player: ``shot(x, y, z)`` is the pixel ``(4,)`` where a point lies; alpha is 0 beside the mesh."""
-
-    def __init__(self, data: str, projection: list[float]) -> None:
-        self.pixels = np.asarray(Pillow.open(io.BytesIO(base64.b64decode(data))).convert("RGBA"), int)
-        self._projection = np.reshape(projection, (4, 4))
-
-    def __call__(self, *point: float) -> Pixels:
-        x, y, _, w = np.array([*point, 1.0]) @ self._projection
-        height, width = self.pixels.shape[:2]
-        column, row = (x / w * 0.5 + 0.5) * width, (0.5 - y / w * 0.5) * height
-        return np.asarray(self.pixels[int(row), int(column)])
 
 
 def show(player: Player, sequence: MeshSequence, site: Site, **attributes: str) -> Shot:
@@ -285,13 +266,6 @@ def test_playing_a_field_keeps_up(player: Player, site: Site) -> None:
         return [wrong, shown];"""
     )
     assert shown > 40 and wrong <= 2  # at the start of a group that is not there yet
-
-
-def hue(pixel: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Shares of red, green and blue in linear light."""
-    srgb = np.asarray(pixel, float)[:3] / 255
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return np.asarray(linear / linear.sum())
 
 
 def viridis(value: float) -> npt.NDArray[np.float64]:

@@ -16,6 +16,7 @@ from asset_files import picture, write_asset
 from sequences import waving
 
 import gvpipe
+from gvpipe.model.warp import warped
 
 REASON = browsers.missing() or npm_project.missing()
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(REASON), reason=REASON)]
@@ -171,6 +172,46 @@ def test_materials_attributes_fields_and_parts(page: Run, folder: Path) -> None:
     assert found["back"] == 2 and found["none"] == "there is no field 'speed'; fields: height"
     assert found["drawn"] == 48 and found["names"] == ["left", "right"] and found["notes"] == []
     assert found["clone"] == ["Mesh", True, True] and found["hits"] == 1
+
+
+def test_a_field_moves_vertices(page: Run, folder: Path) -> None:
+    """As Python's warped sequence, float32 for float32 in model units; bounds hold it, and normals follow."""
+    sequence = waving(10, 6)
+    random = np.random.default_rng(0)
+    fields = {
+        "disp": random.normal(size=(6, 100, 3)).astype(np.float32),
+        "flat": random.normal(size=(6, 100, 2)),
+        "heat": np.zeros((6, 100)),
+    }
+    video = write_asset(folder / "moved.mp4", gvpipe.MeshSequence(sequence.positions[:], sequence.faces, 24.0, fields=fields))
+    found = page(
+        """const mesh = await load("moved.mp4");
+        const seen = [];
+        for (const [name, scale, k] of args[0]) {
+          const isShown = await mesh.setWarp(name, scale);
+          await mesh.seek(k);
+          const { min, max } = mesh.geometry.boundingBox;
+          const [front, normals] = [array(mesh, "position"), array(mesh, "normal")];
+          seen.push([isShown, front, normals, min.toArray(), max.toArray()]);
+        }
+        const none = await mesh.setWarp("heat").catch((error) => error.message);
+        const two = await Promise.all([mesh.setWarp("disp", 9), mesh.setWarp(null)]);
+        return [seen, none, two, array(mesh, "position")];""",
+        [["disp", 0.5, 2], ["disp", -3, 5], ["flat", 1.5, 4], [None, 1, 1]],
+    )
+    wanted = [
+        *(warped(video.sequence(), text).read(k, k + 1)[0] for text, k in (("disp:0.5", 2), ("disp:-3", 5), ("flat:1.5", 4))),
+        video[1],
+    ]
+    for (is_shown, positions, normals, low, high), points in zip(found[0], wanted, strict=True):
+        assert is_shown and np.abs(pages.points(positions) - points).max() <= 2 * np.spacing(np.abs(points).max())
+        assert (points >= np.array(low) - 1e-5).all() and (points <= np.array(high) + 1e-5).all()
+        sides = np.cross(*(points[video.faces[:, i]] - points[video.faces[:, 0]] for i in (1, 2)))
+        sums = np.zeros((100, 3))
+        np.add.at(sums, video.faces.ravel(), np.repeat(sides, 3, axis=0))
+        assert np.abs(pages.points(normals) - sums / np.linalg.norm(sums, axis=1, keepdims=True)).max() < 1e-4
+    assert "no field 'heat' of displacements" in found[1] and found[2] == [False, True]
+    assert np.array_equal(pages.points(found[3]), video[1])
 
 
 def test_points_without_triangles(page: Run, folder: Path) -> None:

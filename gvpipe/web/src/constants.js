@@ -197,6 +197,9 @@ export const HIERARCHY_KEPT_PER_TRIANGLE = 180;
 export const HIERARCHY_SECONDS_PER_VERTEX = 1e-06;
 export const HIERARCHY_SECONDS_PER_TRIANGLE = 2e-06;
 
+// gvpipe.model.warp
+export const WARP_USUAL = ["displacement", "displacements", "disp", "displ", "u", "depl"];
+
 // gvpipe.rasterizer.colormaps
 export const COLORMAPS_MAGMA = "\n000004 030311 0a0822 130d33 1d1146 28115a 36106a 430f76 50127c 5d177f 691c81 762181 822681 8f2a81 9c2e7f a9327d b63779 c33b75\ncf4170 db486a e65163 ee5c5e f5695c f9785d fb8761 fd9668 fea571 feb47b fec387 fed194 fde0a2 fceeb0 fcfdbf\n";
 export const COLORMAPS_VIRIDIS = "\n440154 470d60 48186a 482374 472d7b 453681 424086 3f4989 3b528b 375a8d 33638d 2f6a8e 2c728e 297a8e 26818e 23898e 21908c 1f988b\n1f9f88 21a685 28ae80 31b57b 3ebc74 4cc26c 5dc963 6ece58 82d34c 96d83f abdc32 c0df24 d5e21a eae51a fde725\n";

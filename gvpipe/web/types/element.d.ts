@@ -1,6 +1,6 @@
 /** The element `<geometry-video>`; to import this defines it. */
 
-import type { GeometryVideo, Source } from "./geometry-video.js";
+import type { GeometryVideo, Picked, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -11,8 +11,16 @@ export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, 
   frame: CustomEvent<number>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
+  /** A point was clicked on. */
+  probe: CustomEvent<Probed>;
   /** `detail` is a `GeometryVideoError` if the file or its server is at fault. */
   error: CustomEvent<Error>;
+}
+
+export interface Probed extends Picked {
+  readonly frame: number;
+  /** Of the field shown, vectors by their length; null if none is shown, or it has no value there. */
+  readonly value: number | null;
 }
 
 /** Stretches of time, in seconds. */
@@ -60,6 +68,12 @@ export class GeometryVideoElement extends HTMLElement {
   seek(k: number): Promise<void>;
   readonly colormap: string;
   readonly range: [number, number] | null;
+  /** How colours follow values; attribute `scale`. */
+  scale: "linear" | "log";
+  /** The field that moves vertices, and how far; attribute `warp`, such as "displacement:10". */
+  readonly warp: { name: string; scale: number } | null;
+  /** Azimuth and elevation of the first view, degrees, or null: the player's own; attribute `camera`. */
+  readonly camera: [number, number] | null;
   readonly hiddenParts: Set<string>;
   /** Hides the parts of these names, and shows all others. */
   hide(names: string | Iterable<string>): void;

@@ -82,6 +82,16 @@ export interface Field {
   frame(k: number): Promise<Values>;
 }
 
+/** A point of the mesh that was pointed at. */
+export interface Picked {
+  /** The nearest vertex of the triangle, or of the points. */
+  readonly vertex: number;
+  /** null: the mesh has no triangles. */
+  readonly triangle: number | null;
+  /** Name of its part; null if there are none. */
+  readonly part: string | null;
+}
+
 export interface Texture {
   /** Index into `images`. */
   readonly image: number;

@@ -1,7 +1,7 @@
 /** Geometry videos in scenes of three.js. */
 
-import type { BufferGeometry, Loader, LoadingManager, Material as ThreeMaterial, Mesh, Object3DEventMap, Texture as ThreeTexture } from "three";
-import type { GeometryVideo, Source } from "./geometry-video.js";
+import type { BufferGeometry, Loader, LoadingManager, Material as ThreeMaterial, Mesh, Object3DEventMap, Ray, Texture as ThreeTexture } from "three";
+import type { GeometryVideo, Picked, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -83,11 +83,28 @@ export class GeometryVideoMesh extends MeshOfVideo {
   readonly partNames: string[];
   /** Hides the parts of these names, and shows all others. */
   hide(names: string | Iterable<string>): void;
+  /** Edges of polygons, without the diagonals of their triangles. */
   setWireframe(visible: boolean): void;
+  /** true: each triangle has one normal, so that its edges show. */
+  setFlatShading(isFlat: boolean): void;
+  /**
+   * Moves vertices by a field of two or three components at vertices, `scale` times as far; null: by none. A promise whether it is
+   * shown; false if another call came since.
+   */
+  setWarp(name: string | null, scale?: number): Promise<boolean>;
+  /** The box that the motion stays in, displacements with it, model units. It may grow. */
+  readonly bounds: { min: [number, number, number]; max: [number, number, number] };
+  /** What of the frame shown a ray meets first, hidden parts apart, in the geometry's units; of a triangle, its nearest vertex. */
+  pick(ray: Ray): Picked | null;
   /** Shows a field in colours; null: the materials. A promise of the range; null if another call came since. */
   showField(
     name: string | null,
-    options?: { colormap?: "viridis" | "magma" | "coolwarm" | "gray"; range?: [number, number] | null },
+    options?: {
+      colormap?: "viridis" | "magma" | "coolwarm" | "gray";
+      range?: [number, number] | null;
+      /** "log": colours follow the logarithm, if the range lies above 0. */
+      scale?: "linear" | "log";
+    },
   ): Promise<[number, number] | null>;
   /** A mesh that shares geometry and materials, and so moves with this one. */
   clone(recursive?: boolean): Mesh;

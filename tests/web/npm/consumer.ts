@@ -1,5 +1,5 @@
 // What a project in TypeScript writes, and what its compiler must refuse.
-import { PerspectiveCamera, Scene, type Mesh } from "three";
+import { PerspectiveCamera, Ray, Scene, type Mesh } from "three";
 import { GeometryVideo, GeometryVideoError, type Attribute } from "gvpipe";
 import { GeometryVideoElement } from "gvpipe/element";
 import { GeometryVideoLoader, GeometryVideoMesh } from "gvpipe/three";
@@ -32,6 +32,10 @@ export async function show(scene: Scene, camera: PerspectiveCamera): Promise<Geo
   const range: [number, number] | null = await mesh.showField("height", { colormap: "magma", range: [0, 1] });
   // @ts-expect-error no such colour map
   await mesh.showField("height", { colormap: "rainbow" });
+  await mesh.showField("height", { scale: "log" });
+  const isMoved: boolean = await mesh.setWarp("displacement", 10);
+  const picked: number | undefined = mesh.pick(new Ray(camera.position, mesh.position))?.vertex;
+  mesh.setFlatShading(isMoved && picked === 0);
   await mesh.play();
   mesh.update(range?.[1] ?? 0.04);
   return mesh;
@@ -42,6 +46,8 @@ export function control(): number {
   const same: GeometryVideoElement = element;
   same.addEventListener("frame", (event) => event.detail.toFixed(0));
   same.addEventListener("click", (event) => event.clientX);
+  same.addEventListener("probe", ({ detail }) => detail.value?.toFixed(detail.vertex));
+  same.scale = same.warp || same.camera?.[0] ? "log" : "linear";
   same.playbackRate = 2;
   // @ts-expect-error it follows from the file
   same.duration = 3;

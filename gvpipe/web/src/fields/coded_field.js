@@ -44,6 +44,8 @@ export class CodedField {
     this.fullScale = entry.fullScale;
     /** Largest length of a vector in what was decoded. */
     this.largest = 0;
+    /** `[low, high]` of each component in what was decoded, of vectors of 2 or 3. */
+    this.extents = Array.from({ length: this.components }, () => [0, 0]);
     this.#host = host;
     this.#isOctahedral = isOctahedral;
     this.#reduction = reduction;
@@ -74,6 +76,14 @@ export class CodedField {
     const next = (number + 1) % this.#head.segments.length;
     if (!this.#segments.has(next)) this.#load(next).catch(() => {}); // reported when it is shown
     return true;
+  }
+
+  /** The numbers of a row in frame k, if it is in memory, else null. @returns {Float32Array|null} */
+  row(k, row) {
+    const segment = this.#head && this.#segments.get(this.#numberOf(k));
+    if (!segment) return null;
+    const start = row * this.components;
+    return this.#frameOf(segment, k, this.#numberOf(k)).subarray(start, start + this.components);
   }
 
   /** A promise that frame k is in memory. */
@@ -131,6 +141,7 @@ export class CodedField {
     const decoded = await this.#host.decode(job);
     const values = this.#isOctahedral ? fromOctahedral(decoded) : restored(decoded, this.#reduction);
     if (this.components > 1) this.largest = Math.max(this.largest, longest(values, this.components));
+    if (this.components === 2 || this.components === 3) widen(this.extents, values);
     this.#segments.set(number, values);
     for (const old of this.#segments.keys()) {
       if (this.#segments.size <= KEPT_SEGMENTS || this.#segments.size * values.byteLength <= KEPT_BYTES) break;
@@ -138,6 +149,18 @@ export class CodedField {
     }
     return values;
   }
+}
+
+/** Make room for the values of each component; holes need none. */
+function widen(extents, values) {
+  extents.forEach((extent, c) => {
+    let [low, high] = extent;
+    for (let i = c; i < values.length; i += extents.length) {
+      if (values[i] < low) low = values[i];
+      if (values[i] > high) high = values[i];
+    }
+    extents[c] = [low, high];
+  });
 }
 
 /** The largest length of the rows of `values (n, C)`; holes count for nothing. */

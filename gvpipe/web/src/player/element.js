@@ -4,9 +4,11 @@
  * Attributes: `src` (an address, or `#id` of an element in the page that holds the file as base64 text), `autoplay` (not for
  * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
  * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours),
+ * `scale` ("log": colours follow the logarithm), `warp` ("name:scale" of a field that moves vertices), `camera`
+ * ("azimuth,elevation" of the first view, degrees), `shading` ("flat": each triangle has one normal),
  * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up).
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number), `levelchange` (detail: the level of detail that is shown); `error` has a `GeometryVideoError` as its detail.
+ * the frame's number), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
@@ -14,13 +16,17 @@ import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
 import { checkSeconds, paused } from "../playback.js";
 import { FASTEST, SLOWEST, checkRate } from "../playback_rate.js";
 import { COLORMAPS } from "../three/colormaps.js";
+import { isLogarithmic } from "../three/field_colours.js";
+import { parseWarp, usualMover } from "../three/warp.js";
 import { Bar, nextSpeed } from "./bar.js";
+import { listenToClicks } from "./clicks.js";
 import { embedded } from "./embedded.js";
 import { actionOf } from "./keys.js";
 import { Legend } from "./legend.js";
 import { Load } from "./load.js";
 import { isFullscreen, save, toggleFullscreen } from "./outside.js";
 import { Panel } from "./panel.js";
+import { Probe } from "./probe.js";
 import { Stage, probeGpu } from "./stage.js";
 import style from "./style.css";
 import { TimeRanges } from "./time_ranges.js";
@@ -31,6 +37,7 @@ const MARKUP = `<style>${style}</style>
     <canvas tabindex="0" role="img" aria-label="${LABEL}"></canvas>
     <div class="legend" hidden></div>
     <div class="panel"></div>
+    <div class="probe" role="group" aria-label="Probe" hidden></div>
     <div class="message" role="status"></div>
   </div>
   <div class="bar" part="bar" role="group" aria-label="Playback"></div>`;
@@ -40,17 +47,22 @@ const LOST = "The browser took the picture's WebGL away, as it does when a page 
 const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTMLMediaElement
 const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "waiting", "ended", "ratechange"];
 
+const FIELD_ATTRIBUTES = ["field", "colormap", "range", "scale"];
+const VIEW_ATTRIBUTES = ["warp", "camera", "shading"];
+const MOST_SHARE = 0.25; // of the diagonal, that the slider's end moves vertices by
+
 /** Where there are no pages, modules that name the element can still be loaded. */
 const Base = globalThis.HTMLElement ?? class {};
 
 export class GeometryVideoElement extends Base {
-  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "field", "colormap", "range", "lod"];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "lod", ...FIELD_ATTRIBUTES, ...VIEW_ATTRIBUTES];
 
   #stage = null;
   #bar;
   #panel;
   #legend;
   #message;
+  #probe;
   #loading = null; // Load
   #loaded = null; // promise, while a file is loaded
   #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
@@ -85,11 +97,14 @@ export class GeometryVideoElement extends Base {
     this.#panel = new Panel(root.querySelector(".panel"), {
       field: (name) => (name ? this.setAttribute("field", name) : this.removeAttribute("field")),
       colormap: (name) => this.setAttribute("colormap", name),
+      warp: (name, scale) => this.setAttribute("warp", `${name}:${scale}`),
       hide: (names) => this.hide(names),
     });
     this.#legend = new Legend(root.querySelector(".legend"));
+    this.#probe = new Probe(root.querySelector(".probe"), (vertex) => this.#stage?.setMark(vertex));
     this.#bar.setEnabled(false);
     root.addEventListener("keydown", (event) => this.#onKey(event));
+    listenToClicks(root.querySelector(".stage"), (x, y) => this.#pick(x, y));
     if (!document.fullscreenEnabled) this.#bar.hide("fullscreen"); // phones may show films alone so
     this.addEventListener("fullscreenchange", () => this.#bar.setPressed("fullscreen", isFullscreen(this)));
   }
@@ -124,7 +139,8 @@ export class GeometryVideoElement extends Base {
     if (name === "follow") this.#stage?.setFollowing(value !== null);
     if (name === "lod" && before !== value && this.#mesh) this.#mesh.lod = this.lod;
     if (name === "speed") this.#bar.setSpeed(this.speed);
-    if (["field", "colormap", "range"].includes(name) && before !== value && this.#mesh) this.#showField();
+    if (FIELD_ATTRIBUTES.includes(name) && before !== value && this.#mesh) this.#showField();
+    if (VIEW_ATTRIBUTES.includes(name) && before !== value && this.#mesh) this.#showView(name);
     if (name === "loop" && this.#mesh) this.#mesh.loop = this.loop;
     if (name === "speed" && this.#mesh) this.#mesh.playbackRate = this.speed;
     else if (name === "speed" && before !== value) this.#tell("ratechange");
@@ -244,6 +260,27 @@ export class GeometryVideoElement extends Base {
     return numbers.length === 2 && numbers[0] < numbers[1] ? numbers : null;
   }
 
+  /** "log" or "linear": how colours follow values. A range that does not lie above 0 is shown linearly. */
+  get scale() {
+    return this.getAttribute("scale") === "log" ? "log" : "linear";
+  }
+
+  set scale(scale) {
+    this.setAttribute("scale", scale);
+  }
+
+  /** `{name, scale}` of the field that moves vertices, or null. */
+  get warp() {
+    return this.video && parseWarp(this.getAttribute("warp"), this.video.fields);
+  }
+
+  /** Azimuth and elevation of the first view, degrees, or null: the player's own. */
+  get camera() {
+    const words = (this.getAttribute("camera") ?? "").split(",");
+    const numbers = words.map((word) => (word.trim() ? Number(word) : NaN));
+    return numbers.length === 2 && numbers.every(Number.isFinite) && Math.abs(numbers[1]) <= 90 ? numbers : null;
+  }
+
   /** Names of the parts that are hidden. */
   get hiddenParts() {
     return new Set(this.#hidden);
@@ -288,6 +325,7 @@ export class GeometryVideoElement extends Base {
       probeGpu(); // while a worker decodes
       await load.step(breathe());
       this.#stage ??= this.#openStage();
+      this.#stage.setView(this.camera);
       const video = await load.step(loaded);
       await load.step(breathe());
       await load.step(this.#stage.setMesh(video, this.getAttribute("up") ?? (video.metadata.up_axis === "z" ? "z" : "y")));
@@ -299,7 +337,7 @@ export class GeometryVideoElement extends Base {
       this.#say("");
       this.#openMesh();
       await load.step(breathe());
-      await load.step(this.#showField());
+      await load.step(Promise.all([this.#showField(), this.#showWarp()]));
       this.#becomeReady(load);
     } catch (error) {
       loaded?.then((late) => late.close(), () => {});
@@ -341,18 +379,30 @@ export class GeometryVideoElement extends Base {
     const { mesh } = this.#stage;
     this.#stage.setWireframe(this.hasAttribute("wireframe"));
     this.#stage.setFollowing(this.hasAttribute("follow"));
+    this.#showView("shading");
     mesh.loop = this.loop;
     mesh.playbackRate = this.speed;
     if (this.lod !== mesh.lod) mesh.lod = this.lod;
     for (const name of MEDIA_EVENTS) mesh.addEventListener(name, () => this.#tell(name));
-    for (const name of ["play", "pause"]) mesh.addEventListener(name, () => this.#bar.setPlaying(!mesh.paused));
+    for (const name of ["play", "pause"]) {
+      mesh.addEventListener(name, () => {
+        this.#bar.setPlaying(!mesh.paused);
+        this.#probe.setPlaying(!mesh.paused);
+      });
+    }
     mesh.addEventListener("frame", ({ frame }) => {
       this.#bar.setFrame(frame);
+      this.#probe.setFrame(frame);
       this.#tell("frame", frame);
     });
+    mesh.addEventListener("change", () => this.#probe.setFrame(mesh.currentFrame)); // late values of a field
     mesh.addEventListener("levelchange", ({ level }) => {
       this.#bar.setVideo(this.video);
-      if (level === 0) this.#showField();
+      this.#probe.close(); // it has other vertices
+      if (level === 0) {
+        this.#showField();
+        this.#showWarp();
+      }
       this.#tell("levelchange", level);
     });
     for (const name of ["progress", "durationchange"]) {
@@ -438,7 +488,7 @@ export class GeometryVideoElement extends Base {
     this.#say(field ? `Decoding ${field.name} …` : "");
     let range;
     try {
-      range = await this.#stage.showField(field && field.name, { colormap: this.colormap, range: this.range });
+      range = await this.#stage.showField(field && field.name, { colormap: this.colormap, range: this.range, scale: this.scale });
     } catch (error) {
       if (video === this.video) this.#interrupt(error);
       return;
@@ -447,8 +497,47 @@ export class GeometryVideoElement extends Base {
     this.#say("");
     const hasMap = field !== null && field.kind !== "color";
     this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
-    if (hasMap) this.#legend.show(field, this.colormap, range);
+    if (hasMap) this.#legend.show(field, this.colormap, range, isLogarithmic(this.scale, range));
     else this.#legend.hide();
+    this.#probe.setField(field);
+  }
+
+  /** Show what one of the attributes about the view asks for. */
+  #showView(name) {
+    if (name === "camera") this.#stage.setView(this.camera);
+    else if (name === "shading") this.#stage.setFlatShading(this.getAttribute("shading") === "flat");
+    else this.#showWarp();
+  }
+
+  /** Move vertices by the field of attribute `warp`, if the video has it; offer what else can move them. */
+  async #showWarp() {
+    const { video, warp } = this;
+    if (video.level) return; // only the whole mesh has fields
+    const name = warp?.name ?? usualMover(video.fields);
+    this.#panel.setWarp(name, warp?.scale ?? 0, name === null ? 1 : mostScale(video, video.fields.get(name)));
+    try {
+      await this.#stage.setWarp(warp?.name ?? null, warp?.scale ?? 0);
+    } catch (error) {
+      if (video === this.video) this.#interrupt(error);
+    }
+  }
+
+  /** Open the probe at a point of the picture, in CSS pixels from its upper left; beside the mesh, close it. */
+  async #pick(x, y) {
+    if (!this.#isReady) return;
+    const picked = this.#stage.pick(x, y);
+    if (!picked) {
+      this.#probe.close();
+      return;
+    }
+    const { video, currentFrame: frame } = this;
+    const field = video.level ? null : (video.fields.get(this.getAttribute("field")) ?? null);
+    try {
+      const value = await this.#probe.open(video, field, picked, frame);
+      if (video === this.video) this.#tell("probe", { ...picked, frame, value });
+    } catch (error) {
+      if (video === this.video) this.#interrupt(error);
+    }
   }
 
   /** Steps in a row add up, however fast they come. */
@@ -475,6 +564,7 @@ export class GeometryVideoElement extends Base {
   }
 
   #act(name) {
+    const canvas = this.shadowRoot.querySelector("canvas");
     const actions = {
       play: () => (this.paused ? this.play().catch(() => {}) : this.pause()),
       back: () => this.#step(-1),
@@ -495,11 +585,17 @@ export class GeometryVideoElement extends Base {
       "turn-right": () => this.#stage.orbit(TURN, 0),
       "turn-up": () => this.#stage.orbit(0, TURN),
       "turn-down": () => this.#stage.orbit(0, -TURN),
+      probe: () => this.#pick(canvas.clientWidth / 2, canvas.clientHeight / 2),
     };
     if (this.video && this.#stage) actions[name]();
   }
 
   #onKey(event) {
+    if (event.key === "Escape" && this.#probe.isOpen) {
+      event.stopPropagation(); // it closes one thing
+      this.#probe.close();
+      return;
+    }
     const action = actionOf(event);
     if (!action) return;
     event.preventDefault();
@@ -545,11 +641,20 @@ export class GeometryVideoElement extends Base {
     this.#stage?.clear();
     this.#legend.hide();
     this.#panel.clear();
+    this.#probe.close();
     this.#bar.setNotes([]);
     this.#bar.setEnabled(false);
     this.#bar.setPlaying(false);
     if (wasLoaded) this.#tell("emptied");
   }
+}
+
+/** Where a slider of displacements ends: a power of ten that moves vertices by about a quarter of the diagonal, at least 1. */
+function mostScale({ bounds: { min, max } }, { range }) {
+  const largest = range ? Math.max(Math.abs(range[0]), Math.abs(range[1])) : 0;
+  const diagonal = Math.hypot(...max.map((high, axis) => high - min[axis]));
+  const wanted = largest > 0 ? (MOST_SHARE * diagonal) / largest : 1;
+  return wanted > 1 ? 10 ** Math.min(12, Math.ceil(Math.log10(wanted))) : 1;
 }
 
 function openStage(canvas) {

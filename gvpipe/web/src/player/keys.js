@@ -14,6 +14,7 @@ const KEYS = {
   w: "wireframe",
   r: "view",
   c: "follow",
+  v: "probe",
   p: "still",
   f: "fullscreen",
 };
@@ -23,7 +24,7 @@ const SHIFTED = { ArrowLeft: "turn-left", ArrowRight: "turn-right", ArrowUp: "tu
 export function actionOf(event) {
   const { key, target } = event;
   if (event.ctrlKey || event.metaKey || event.altKey) return undefined;
-  if (target.matches("input[type=search]")) return undefined; // all keys write there
+  if (target.matches("input[type=search], input[type=number]")) return undefined; // all keys write there
   if (key === " " && target.matches("button, select, summary, input[type=checkbox]")) return undefined; // space presses it
   if (/^(Arrow|Home|End)/.test(key) && target.matches("input, select")) return undefined; // its own steps
   return event.shiftKey && SHIFTED[key] ? SHIFTED[key] : (KEYS[key] ?? KEYS[key.toLowerCase()]);

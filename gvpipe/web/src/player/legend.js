@@ -17,21 +17,29 @@ export class Legend {
     this.root.hidden = true;
   }
 
-  /** @param {import("../fields/coded_field.js").CodedField} field @param {string} colormap @param {[number, number]} range */
-  show(field, colormap, [low, high]) {
-    const what = field.components > 1 ? `|${field.name}|` : field.name;
-    this.title.textContent = field.unit ? `${what}, ${field.unit}` : what;
+  /**
+   * @param {import("../fields/coded_field.js").CodedField} field @param {string} colormap @param {[number, number]} range
+   * @param {boolean} isLog whether colours follow the logarithm
+   */
+  show(field, colormap, [low, high], isLog) {
+    this.title.textContent = field.unit ? `${titleOf(field)}, ${field.unit}` : titleOf(field);
     this.title.title = field.bound ? `within ${formatNumber(field.bound, field.bound)}` : "";
     this.map.style.background = cssGradient(colormap);
-    const values = Array.from({ length: TICKS }, (_, i) => low + (i / (TICKS - 1)) * (high - low));
+    const at = (part) => (isLog ? low * (high / low) ** part : low + part * (high - low));
+    const values = Array.from({ length: TICKS }, (_, i) => at(i / (TICKS - 1)));
     const items = (high > low ? values : [low]).map((value) => {
       const item = document.createElement("li");
-      item.textContent = formatNumber(value, high - low);
+      item.textContent = isLog ? String(Number(value.toPrecision(3))) : formatNumber(value, high - low);
       return item;
     });
     this.ticks.replaceChildren(...items);
     this.root.hidden = false;
   }
+}
+
+/** What is shown of a field: a length of vectors. */
+export function titleOf({ name, components }) {
+  return components > 1 ? `|${name}|` : name;
 }
 
 /** Four digits of the span are enough to read a colour. */

@@ -1,4 +1,7 @@
-/** Menus over the picture: the field that is shown and its colour map, and the parts that are. They are there if there is a choice. */
+/**
+ * Menus over the picture: the field that is shown and its colour map, how far a field moves the mesh, and the parts that are shown.
+ * They are there if there is a choice.
+ */
 
 import { COLORMAPS } from "../three/colormaps.js";
 
@@ -8,6 +11,9 @@ const MOST_LISTED = 200;
 const MARKUP = `
   <label class="choice" hidden><span>Show</span> <select data-of="field" aria-label="Field"></select></label>
   <label class="choice" hidden><span>Colours</span> <select data-of="colormap" aria-label="Colour map"></select></label>
+  <div class="choice warp" hidden>
+    <span></span> <input type="range" aria-label="Scale of the displacement"> <input type="number" step="any" aria-label="Scale of the displacement">
+  </div>
   <details class="choice" hidden>
     <summary>Parts</summary>
     <input type="search" placeholder="Name" aria-label="Name of parts" hidden>
@@ -18,8 +24,8 @@ const MARKUP = `
 export class Panel {
   /**
    * @param {HTMLElement} root filled with the menus
-   * @param {{field: (name: string) => void, colormap: (name: string) => void, hide: (names: Set<string>) => void}} on called for what
-   *   the user asks for; field "" is the materials
+   * @param {{field: (name: string) => void, colormap: (name: string) => void, warp: (name: string, scale: number) => void,
+   *   hide: (names: Set<string>) => void}} on called for what the user asks for; field "" is the materials
    */
   constructor(root, on) {
     root.innerHTML = MARKUP;
@@ -27,7 +33,9 @@ export class Panel {
     this.on = on;
     [this.fields, this.colormaps] = root.querySelectorAll("select");
     this.parts = root.querySelector("details");
-    this.filter = root.querySelector("input");
+    this.filter = root.querySelector("input[type=search]");
+    this.warp = root.querySelector(".warp");
+    [this.warpName, this.slider, this.scale] = this.warp.children;
     this.list = root.querySelector("ul");
     this.more = root.querySelector("p");
     this.names = [];
@@ -35,6 +43,9 @@ export class Panel {
     this.colormaps.append(...COLORMAPS.map((name) => new Option(name, name)));
     this.fields.addEventListener("change", () => on.field(this.fields.value));
     this.colormaps.addEventListener("change", () => on.colormap(this.colormaps.value));
+    for (const input of [this.slider, this.scale]) {
+      input.addEventListener("input", () => Number.isFinite(input.valueAsNumber) && on.warp(this.mover, input.valueAsNumber));
+    }
     this.filter.addEventListener("input", () => this.#listParts());
     this.list.addEventListener("change", ({ target }) => this.#toggle(this.names[target.value], target.checked));
   }
@@ -57,12 +68,31 @@ export class Panel {
 
   clear() {
     for (const choice of this.root.children) choice.hidden = true;
+    this.mover = null;
   }
 
   setField(name, colormap, hasMap) {
     this.fields.value = name;
     this.colormaps.value = colormap;
     this.colormaps.parentElement.hidden = !hasMap;
+  }
+
+  /**
+   * How far a field moves the mesh.
+   *
+   * @param {string|null} name of the field; null: none can
+   * @param {number} scale @param {number} most where the slider ends; it does not shrink while the field stays
+   */
+  setWarp(name, scale, most) {
+    const isNew = this.mover !== name;
+    this.mover = name;
+    this.warp.hidden = name === null;
+    if (name === null) return;
+    const reach = Math.max(most, Math.abs(scale), isNew ? 0 : Number(this.slider.max));
+    Object.assign(this.slider, { min: scale < 0 || (!isNew && this.slider.min < 0) ? -reach : 0, max: reach, step: reach / 1000 });
+    this.warpName.textContent = `Move by ${name} ×`;
+    this.slider.value = scale;
+    if (this.scale.valueAsNumber !== scale) this.scale.value = Number(scale.toPrecision(6));
   }
 
   /** @param {Set<string>} names */

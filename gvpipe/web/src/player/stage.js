@@ -2,11 +2,16 @@
 
 import {
   Box3,
+  BufferAttribute,
+  BufferGeometry,
   DirectionalLight,
   HemisphereLight,
   Matrix4,
   PMREMGenerator,
   PerspectiveCamera,
+  Points,
+  PointsMaterial,
+  Ray,
   Scene,
   Spherical,
   Vector3,
@@ -20,10 +25,11 @@ const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const FAR = 100; // balls that the motion fits in, at least
 const MARGIN = 1.06; // around what is framed
 const FOLLOWING_ROOM = 1.15; // around a mesh that is followed, which may stretch out later
-const AZIMUTH = Math.PI / 7; // of the first view: from the front, a little from the right and from above
-const ELEVATION = Math.PI / 12;
+const VIEW = [180 / 7, 15]; // azimuth and elevation of the first view, degrees: from the front, a little from the right and above
+const STEEPEST = 89.9; // degrees of elevation: from straight above no azimuth would be left
 const MAX_PIXEL_RATIO = 2;
 const MAX_ANISOTROPY = 8; // of textures seen at a flat angle
+const MARK = { color: 0xe0532f, size: 9, sizeAttenuation: false, depthTest: false }; // of a vertex that is pointed at
 const ROOM_PIXELS = 64; // a side of what metal reflects
 const ROOM_BLUR = 0.04; // radians
 const SOFTWARE = /SwiftShader|llvmpipe|softpipe|software|Basic Render/i; // renderers that run on the processor
@@ -47,7 +53,13 @@ export class Stage {
     this.controls.addEventListener("start", () => (this.isFramed = false));
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
+    this.view = VIEW;
     this.mesh = null;
+    this.marked = null; // a vertex
+    this.mark = new Points(new BufferGeometry(), new PointsMaterial(MARK));
+    this.mark.geometry.setAttribute("position", new BufferAttribute(new Float32Array(3), 3));
+    Object.assign(this.mark, { visible: false, frustumCulled: false, renderOrder: 1 });
+    this.scene.add(this.mark);
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.size = ""; // of the picture, as it is
@@ -69,7 +81,7 @@ export class Stage {
     if (turn !== this.turn) return mesh.dispose(); // another mesh has come meanwhile, or the stage is closed
     this.mesh = mesh;
     mesh.addEventListener("frame", () => this.#frameShown());
-    mesh.addEventListener("change", () => this.requestRender());
+    mesh.addEventListener("change", () => this.setMark(this.marked));
     mesh.addEventListener("levelchange", () => this.#findUsed());
     this.#findUsed();
     this.middle = new Vector3();
@@ -97,6 +109,41 @@ export class Stage {
     this.requestRender();
   }
 
+  setFlatShading(isFlat) {
+    this.mesh?.setFlatShading(isFlat);
+    this.requestRender();
+  }
+
+  /** Where the first view looks from. @param {[number, number]|null} view azimuth and elevation, degrees, as of `gvpipe.render` */
+  setView(view) {
+    this.view = view ?? VIEW;
+    if (this.mesh) this.resetView();
+  }
+
+  /** Move vertices by a field (`GeometryVideoMesh.setWarp`). */
+  async setWarp(name, scale) {
+    const { mesh } = this;
+    if ((await mesh.setWarp(name, scale)) && mesh === this.mesh) this.#frameShown();
+  }
+
+  /** What is seen at a point of the picture (`GeometryVideoMesh.pick`). @param {number} x @param {number} y CSS pixels, from its upper left */
+  pick(x, y) {
+    const { camera } = this;
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement;
+    camera.updateMatrixWorld();
+    const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+    const beyond = new Vector3((2 * x) / width - 1, 1 - (2 * y) / height, 0.5).unproject(camera);
+    return this.mesh.pick(new Ray(origin, beyond.sub(origin)));
+  }
+
+  /** Mark a vertex of the mesh, or none. @param {number|null} vertex */
+  setMark(vertex) {
+    this.marked = vertex;
+    this.mark.visible = vertex !== null && this.mesh !== null;
+    if (this.mark.visible) this.mark.position.fromArray(this.mesh.framePositions, 3 * vertex);
+    this.requestRender();
+  }
+
   /** Show a field in colours (`GeometryVideoMesh.showField`). */
   async showField(name, options) {
     const range = await this.mesh.showField(name, options);
@@ -117,13 +164,15 @@ export class Stage {
     if (this.mesh) this.resetView();
   }
 
-  /** Look from the front at the whole motion, or at the mesh that is followed. */
+  /** Look from where the first view does at the whole motion, or at the mesh that is followed. */
   resetView() {
     const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
     const front = new Vector3(...upright.slice(0, 3));
     const up = new Vector3(...upright.slice(3));
-    const direction = front.multiplyScalar(Math.cos(ELEVATION)).addScaledVector(up, Math.sin(ELEVATION));
-    direction.applyAxisAngle(up, AZIMUTH);
+    const [azimuth, steep] = this.view;
+    const [turn, rise] = [azimuth, Math.min(STEEPEST, Math.max(-STEEPEST, steep))].map((degrees) => (degrees * Math.PI) / 180);
+    const direction = front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise));
+    direction.applyAxisAngle(up, turn);
     this.box = this.#motion();
     this.middle = this.isFollowing ? this.#findMiddle() : this.box.getCenter(new Vector3());
     const half = this.isFollowing ? this.#findReach(this.middle) : this.box.getSize(new Vector3()).divideScalar(2).toArray();
@@ -162,10 +211,13 @@ export class Stage {
     });
   }
 
-  /** The picture drawn anew, as a promise of a PNG file. */
+  /** The picture drawn anew, without a mark, as a promise of a PNG file. */
   still() {
+    this.mark.visible = false;
     this.renderer.render(this.scene, this.camera); // what was drawn before is gone once it is on the screen
-    return new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+    const picture = new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+    this.setMark(this.marked);
+    return picture;
   }
 
   clear() {
@@ -173,7 +225,8 @@ export class Stage {
       this.scene.remove(this.mesh);
       this.mesh.dispose();
     }
-    this.mesh = null;
+    this.mesh = this.marked = null;
+    this.mark.visible = false;
     this.isFramed = false;
     this.requestRender();
   }
@@ -185,6 +238,8 @@ export class Stage {
     this.observer.disconnect();
     this.controls.dispose();
     this.reflected?.dispose();
+    this.mark.geometry.dispose();
+    this.mark.material.dispose();
     this.renderer.dispose();
   }
 
@@ -202,7 +257,7 @@ export class Stage {
   /** The box of the motion, as far as it is known, in the scene. */
   #motion() {
     const { centre, scale } = this;
-    const { min, max } = this.mesh.video.bounds;
+    const { min, max } = this.mesh.bounds;
     const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
     return new Box3(low, high);
   }
@@ -236,7 +291,7 @@ export class Stage {
   #frameShown() {
     if (this.isFollowing) this.#follow(this.#findMiddle());
     else if (this.isFramed && !this.box.containsBox(this.#motion())) this.resetView(); // the motion goes farther than was known
-    this.requestRender();
+    this.setMark(this.marked);
   }
 
   #follow(middle) {

@@ -10,6 +10,7 @@ import {
   MeshLambertMaterial,
   SRGBColorSpace,
 } from "three";
+import { length } from "../fields/length.js";
 import { HOLE, SIZE, colourTable } from "./colormaps.js";
 import { OFFSET } from "./materials.js";
 import { toLinear } from "./vertex_attributes.js";
@@ -40,17 +41,23 @@ export class FieldColours {
     this.frame = -1;
   }
 
-  /** Make the colours of frame k. @returns {boolean} whether its values were in memory; if not, `field.load` brings them */
-  update(k, [low, high]) {
+  /**
+   * Make the colours of frame k.
+   *
+   * @param {number} k @param {[number, number]} range @param {boolean} isLog whether places follow the logarithm
+   * @returns {boolean} whether its values were in memory; if not, `field.load` brings them
+   */
+  update(k, [low, high], isLog) {
     if (!this.field.read(k, this.values)) return false;
     this.frame = k;
     if (this.isColour) this.#copyColours();
-    else this.#place(low, high);
+    else this.#place(low, high, isLog);
     this.attribute.needsUpdate = true;
     return true;
   }
 
-  #place(low, high) {
+  #place(lowest, highest, isLog) {
+    const [low, high] = isLog ? [Math.log(lowest), Math.log(highest)] : [lowest, highest];
     const { values, rows, table } = this;
     const { components } = this.field;
     const { array } = this.attribute;
@@ -59,6 +66,7 @@ export class FieldColours {
     for (let r = 0; r < rows.length; r++) {
       let value = values[rows[r] * components];
       if (components > 1) value = length(values, rows[r] * components, components);
+      if (isLog) value = value > 0 ? Math.log(value) : NaN;
       const isHole = value !== value; // NaN
       const place = Math.min(1, Math.max(0, (value - low) * scale + offset));
       if (table) {
@@ -100,6 +108,11 @@ export function rangeOf(field, colormap) {
   return [-most, most];
 }
 
+/** Whether colours follow the logarithm: where that is asked for, and the range lies above 0. */
+export function isLogarithmic(scale, [low, high]) {
+  return scale === "log" && low > 0 && high > low;
+}
+
 /** A material that shows a colour map by texture coordinates; of colours, vertex colours. */
 export function fieldMaterial(colormap, isColour) {
   const material = new MeshLambertMaterial({ side: DoubleSide, vertexColors: isColour, ...OFFSET });
@@ -122,10 +135,4 @@ function mapTexture(colormap) {
   texture.wrapS = texture.wrapT = ClampToEdgeWrapping;
   texture.needsUpdate = true;
   return texture;
-}
-
-function length(values, start, components) {
-  let sum = 0;
-  for (let i = start; i < start + components; i++) sum += values[i] * values[i];
-  return Math.sqrt(sum);
 }

@@ -12,21 +12,25 @@ import {
   BufferAttribute,
   BufferGeometry,
   DynamicDrawUsage,
+  LineBasicMaterial,
+  LineSegments,
   Mesh,
-  MeshBasicMaterial,
   Points,
   PointsMaterial,
   Sphere,
   Vector3,
 } from "three";
 import { Playback, checkSeconds } from "../playback.js";
-import { FieldColours, fieldMaterial, linearTable, rangeOf } from "./field_colours.js";
+import { FieldColours, fieldMaterial, isLogarithmic, linearTable, rangeOf } from "./field_colours.js";
 import { makeMaterial, plainMaterial } from "./materials.js";
 import { Normals, groupCorners, groupVertices } from "./normals.js";
 import { PartIndex } from "./part_index.js";
+import { pickPoint, pickTriangle } from "./picking.js";
+import { polygonEdges } from "./polygon_edges.js";
 import { cornerEntries, splitVertices } from "./render_vertices.js";
 import { Textures } from "./textures.js";
 import { colourAttribute, colourArray, uvArray, uvChannels } from "./vertex_attributes.js";
+import { Warp, canMove } from "./warp.js";
 
 const PIXELS = 3; // of a point's side, where there are no triangles
 
@@ -69,6 +73,11 @@ export class GeometryVideoMesh extends Mesh {
   #field = null; // FieldColours
   #wanted = { field: null }; // shown, or to be shown once it is loaded, and how
   #fieldRange = [0, 0];
+  #isLog = false; // whether the field's colours follow the logarithm
+  #warp = null; // Warp
+  #wantedWarp = { field: null, scale: 1 }; // shown, or to be shown once its field is loaded
+  #unmoved = null; // (V, 3) the frame shown, in the geometry's units, before the warp moved it
+  #isFlat = false; // whether each triangle has one normal
   #drawn = this; // what the materials are of: the mesh, or points
   #wires = null;
   #unfollow;
@@ -86,7 +95,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#open(positions, new Set());
     const on = {
       show: (shown, k) => this.#show(shown, k),
-      prepare: (k) => (video.level ? undefined : this.#wanted.field?.load(k)),
+      prepare: (k) => (video.level ? undefined : Promise.all([this.#wanted.field?.load(k), this.#wantedWarp.field?.load(k)])),
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
     };
@@ -195,28 +204,79 @@ export class GeometryVideoMesh extends Mesh {
   hide(names) {
     this.#parts.hide(new Set(typeof names === "string" ? [names] : names));
     if (this.video.triangleCount) this.#parts.fill(this.geometry, this.#render.index);
+    if (this.#wires) this.#fillWires();
   }
 
+  /** Show the edges of polygons. @param {boolean} visible */
   setWireframe(visible) {
     if (visible && !this.#wires && this.video.triangleCount) this.#openWires();
     if (this.#wires) this.#wires.visible = visible;
+  }
+
+  /** Whether each triangle has one normal, so that its edges show; else the surface looks smooth. @param {boolean} isFlat */
+  setFlatShading(isFlat) {
+    this.#isFlat = isFlat;
+    for (const material of [this.#materials, this.#drawn.material].flat()) this.#shade(material);
+  }
+
+  /**
+   * Move vertices by a field of displacements.
+   *
+   * @param {string|null} name of a field of two or three components at vertices; null: none
+   * @param {number} [scale] so many times as far
+   * @returns {Promise<boolean>} whether it is shown; false if another call came since
+   */
+  async setWarp(name, scale = 1) {
+    const field = name === null ? null : this.video.fields.get(name);
+    if (field === undefined || (field && !canMove(field))) throw new RangeError(`there is no field '${name}' of displacements of vertices`);
+    const wanted = (this.#wantedWarp = { field, scale });
+    await field?.load(this.currentFrame);
+    if (wanted !== this.#wantedWarp || this.#isDisposed) return false;
+    if (!field && !this.#warp) return true;
+    this.#unmoved ??= this.framePositions.slice();
+    this.#warp = field && (field === this.#warp?.field ? Object.assign(this.#warp, { scale }) : new Warp(field, scale));
+    this.#moveVertices(this.currentFrame);
+    if (!field) this.#unmoved = null;
+    return true;
+  }
+
+  /** `{min, max}`: the box that the motion stays in, displacements with it, model units, as far as it is known. */
+  get bounds() {
+    return this.#warp ? this.#warp.widened(this.video.bounds) : this.video.bounds;
+  }
+
+  /**
+   * What of the frame shown a ray meets first, hidden parts apart.
+   *
+   * @param {import("three").Ray} ray in the geometry's units
+   * @returns {{vertex: number, triangle: number|null, part: string|null}|null} a triangle and its nearest vertex
+   */
+  pick({ origin, direction }) {
+    const { video, framePositions } = this;
+    const ray = [origin.toArray(), direction.toArray()];
+    if (!video.triangleCount) {
+      const met = pickPoint(...ray, framePositions);
+      return met && { ...met, part: partOf(video.parts, "vertices", met.vertex) };
+    }
+    const met = pickTriangle(...ray, framePositions, video.indices, this.#parts.visible);
+    return met && { ...met, part: partOf(video.parts, "triangles", met.triangle) };
   }
 
   /**
    * Show a field in colours, in place of the materials.
    *
    * @param {string|null} name of a field of the video; null: the materials
-   * @param {{colormap?: string, range?: [number, number]|null}} [options] `range`: values of the first and the last colour; null:
-   *   the field's own
+   * @param {{colormap?: string, range?: [number, number]|null, scale?: string}} [options] `range`: values of the first and the last
+   *   colour; null: the field's own. `scale`: "log" lets colours follow the logarithm, if the range lies above 0
    * @returns {Promise<[number, number]|null>} that range; null if another call came since
    */
-  async showField(name, { colormap = "viridis", range = null } = {}) {
+  async showField(name, { colormap = "viridis", range = null, scale = "linear" } = {}) {
     const field = name === null ? null : this.video.fields.get(name);
     if (field === undefined) throw new RangeError(`there is no field '${name}'; fields: ${[...this.video.fields.keys()].join(", ") || "none"}`);
-    const wanted = (this.#wanted = { field, colormap, range });
+    const wanted = (this.#wanted = { field, colormap, range, scale });
     await field?.load(this.currentFrame);
     if (wanted !== this.#wanted) return null;
-    return this.#setField(field, colormap, range);
+    return this.#setField(wanted);
   }
 
   /** A mesh that shares geometry and materials, and so moves with this one. */
@@ -228,11 +288,13 @@ export class GeometryVideoMesh extends Mesh {
   dispose() {
     this.#isDisposed = true;
     this.#wanted = { field: null };
+    this.#wantedWarp = { field: null, scale: 1 };
     this.#playback.close();
     this.#unfollow();
     this.#tick = null;
     this.#closeField();
     for (const material of [this.#materials, this.#wires?.material].flat()) material?.dispose();
+    this.#wires?.geometry.dispose();
     this.#textures.dispose();
     this.geometry.dispose();
     this.video.close();
@@ -245,7 +307,7 @@ export class GeometryVideoMesh extends Mesh {
 
   #show(positions, k) {
     if (this.video.level === this.#level) {
-      this.#place(positions);
+      this.#place(positions, k);
       this.#setBounds();
       this.#update();
       this.#updateField(k);
@@ -261,7 +323,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#level = video.level;
     /** `Float32Array` (V, 3): the frame shown, in the geometry's units. */
     this.framePositions = new Float32Array(positions.length);
-    this.#place(positions);
+    this.#place(positions, this.currentFrame);
     this.#parts = new PartIndex(video.parts, video.triangleCount);
     this.#parts.hide(hidden);
     this.#colours = colourAttribute(video.attributes);
@@ -281,11 +343,17 @@ export class GeometryVideoMesh extends Mesh {
     const { video } = this;
     this.#dropField();
     this.#closeDrawn();
+    this.#warp = this.#unmoved = null; // it comes back with the whole mesh
     this.#open(positions, this.#parts.hidden);
     this.dispatchEvent({ type: "levelchange", level: video.level });
     const { field, ...options } = this.#wanted;
     if (field && video.fields.has(field.name)) {
       this.showField(field.name, options).catch((error) => this.#tellError(error));
+    }
+    const { field: mover, scale } = this.#wantedWarp;
+    if (mover && video.fields.has(mover.name)) {
+      const moved = this.setWarp(mover.name, scale);
+      moved.then(() => this.dispatchEvent({ type: "change" }), (error) => this.#tellError(error));
     }
     if (!video.images.length || this.#textures.images === video.images) return;
     this.#opening = openTextures(video, this.#view.anisotropy).then((textures) => {
@@ -311,7 +379,7 @@ export class GeometryVideoMesh extends Mesh {
     this.material = [];
   }
 
-  #setField(field, colormap, range) {
+  #setField({ field, colormap, range, scale }) {
     this.#closeField();
     if (!field) {
       this.#drawn.material = this.#materials;
@@ -324,21 +392,48 @@ export class GeometryVideoMesh extends Mesh {
     const isPoints = !this.video.triangleCount;
     this.#field = new FieldColours(field, rows, isPoints ? linearTable(colormap) : null);
     this.#fieldRange = range ?? rangeOf(field, colormap);
+    this.#isLog = isLogarithmic(scale, this.#fieldRange);
     this.geometry.setAttribute(this.#field.name, this.#field.attribute);
     if (isPoints) this.#drawn.material = pointsMaterial(0xffffff, true);
-    else this.#drawn.material = fieldMaterial(colormap, this.#field.isColour);
+    else this.#drawn.material = this.#shade(fieldMaterial(colormap, this.#field.isColour));
     this.#updateField(this.currentFrame);
     return this.#fieldRange;
   }
 
-  #place(positions) {
-    const { framePositions: points } = this;
+  #place(positions, k) {
+    const points = this.#warp ? this.#unmoved : this.framePositions;
     const { centre, scale } = this.#view;
     for (let i = 0; i < points.length; i += 3) {
       points[i] = (positions[i] - centre[0]) * scale;
       points[i + 1] = (positions[i + 1] - centre[1]) * scale;
       points[i + 2] = (positions[i + 2] - centre[2]) * scale;
     }
+    if (this.#warp) this.#move(k);
+  }
+
+  /** Move the vertices of frame k; until its displacements are in memory, by those of the frame before. */
+  #move(k) {
+    const warp = this.#warp;
+    const isThere = warp.read(k);
+    this.framePositions.set(this.#unmoved);
+    warp.move(this.framePositions, this.#view.scale);
+    if (isThere) return;
+    warp.field.load(k).then(
+      () => {
+        if (this.#warp !== warp || this.currentFrame !== k || this.#isDisposed) return; // another one is shown by now
+        this.#moveVertices(k);
+        this.dispatchEvent({ type: "change" });
+      },
+      (error) => this.#warp === warp && this.#tellError(error),
+    );
+  }
+
+  /** Show frame k's vertices moved by the warp as it is now. */
+  #moveVertices(k) {
+    if (this.#warp) this.#move(k);
+    else this.framePositions.set(this.#unmoved);
+    this.#setBounds();
+    this.#update();
   }
 
   /** (3T) which corners share a normal, by the attribute, or by the angles of the frame shown. */
@@ -383,14 +478,15 @@ export class GeometryVideoMesh extends Mesh {
       this.geometry.setAttribute("color", new BufferAttribute(colourArray(this.#colours, rowsOf(this.#colours), !this.video.materials.length), 4));
     }
     this.#setBounds();
-    for (const object of [this.#drawn, this.#wires]) if (object) object.geometry = this.geometry;
+    this.#drawn.geometry = this.geometry;
+    if (this.#wires) this.#fillWires();
     this.#update();
   }
 
   /** The box that the whole motion stays in, as far as it is known. */
   #setBounds() {
     const { centre, scale } = this.#view;
-    const { min, max } = this.video.bounds;
+    const { min, max } = this.bounds;
     const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
     this.geometry.boundingBox = new Box3(low, high);
     this.geometry.boundingSphere = this.geometry.boundingBox.getBoundingSphere(new Sphere());
@@ -403,14 +499,36 @@ export class GeometryVideoMesh extends Mesh {
     this.#materials = this.#parts.materials.map((number) =>
       number === null ? plainMaterial(hasColours) : makeMaterial(materials[number], this.#textures, this.#channels, scene),
     );
-    for (const material of this.#materials) if (material.metalness > 0) material.envMap = this.#view.environment();
+    for (const material of this.#materials) {
+      if (material.metalness > 0) material.envMap = this.#view.environment();
+      this.#shade(material);
+    }
     this.material = this.#materials;
   }
 
   #openWires() {
-    const material = new MeshBasicMaterial({ color: 0x1d2a38, wireframe: true, transparent: true, opacity: 0.35 });
-    this.#wires = Object.assign(new Mesh(this.geometry, material), { frustumCulled: false, raycast() {} });
+    const material = new LineBasicMaterial({ color: 0x1d2a38, transparent: true, opacity: 0.35 });
+    this.#wires = Object.assign(new LineSegments(new BufferGeometry(), material), { frustumCulled: false, raycast() {} });
+    this.#fillWires();
     this.add(this.#wires);
+  }
+
+  /** Edges of the polygons of visible parts, between the vertices that the geometry draws. */
+  #fillWires() {
+    const { video } = this;
+    const edges = video.triangleCount ? polygonEdges(this.#render.index, video.polygons, this.#parts.visible) : new Uint32Array();
+    this.#wires.geometry.dispose();
+    this.#wires.geometry = new BufferGeometry();
+    this.#wires.geometry.setAttribute("position", this.geometry.attributes.position);
+    this.#wires.geometry.setIndex(new BufferAttribute(edges, 1));
+  }
+
+  #shade(material) {
+    if (material.flatShading !== undefined && material.flatShading !== this.#isFlat) {
+      material.flatShading = this.#isFlat;
+      material.needsUpdate = true;
+    }
+    return material;
   }
 
   /** Without triangles the mesh itself draws nothing: it has no material. */
@@ -441,11 +559,11 @@ export class GeometryVideoMesh extends Mesh {
 
   #updateField(k) {
     const colours = this.#field;
-    if (!colours || colours.update(k, this.#fieldRange)) return;
+    if (!colours || colours.update(k, this.#fieldRange, this.#isLog)) return;
     colours.field.load(k).then(
       () => {
         if (this.#field !== colours || this.currentFrame !== k) return; // another one is shown by now
-        colours.update(k, this.#fieldRange);
+        colours.update(k, this.#fieldRange, this.#isLog);
         this.dispatchEvent({ type: "change" });
       },
       (error) => this.#field === colours && this.dispatchEvent({ type: "error", error }),
@@ -466,6 +584,11 @@ export class GeometryVideoMesh extends Mesh {
     this.#drawn.material.dispose();
     this.#field = null;
   }
+}
+
+/** Name of the part that has a vertex or a triangle, or null. */
+function partOf(parts, things, number) {
+  return parts.find(({ [things]: [start, stop] }) => start <= number && number < stop)?.name ?? null;
 }
 
 /** The images that materials show, decoded. */

@@ -13,6 +13,12 @@ export class PartIndex {
     /** Names, in order, each once. */
     this.names = [...new Set(parts.map(({ name }) => name))];
     this.hidden = new Set();
+    this.all = all;
+  }
+
+  /** Triangles that are visible: `[start, stop]` of each part. @returns {[number, number][]} */
+  get visible() {
+    return this.all.filter(({ name }) => !this.hidden.has(name)).map(({ triangles }) => triangles);
   }
 
   /** @param {Set<string>} names */
