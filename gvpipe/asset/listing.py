@@ -55,7 +55,7 @@ def list_things(things: Things) -> dict[str, Any]:
             {"name": image.name, "media_type": image.media_type, "size": _size(image.data), "bytes": len(image.data)}
             for image in things.images
         ],
-        "metadata": dataclasses.asdict(things.metadata),
+        "metadata": {**dataclasses.asdict(things.metadata), "times": list(things.metadata.times)},
     }
 
 
