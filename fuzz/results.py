@@ -8,6 +8,7 @@ import numpy as np
 
 from fuzz.parts import BrokenPromise
 from gvpipe.foundation.arrays import Array
+from gvpipe.grids.volume import Volume
 from gvpipe.model.sequence import MeshSequence
 
 LONGEST_MESSAGE = 1000  # characters
@@ -50,6 +51,8 @@ def check_asset(sequence: MeshSequence, infinite: bool = False) -> None:
             frames = np.asarray(field[start : start + FRAMES])
             if not infinite and frames.dtype.kind == "f" and np.isinf(frames).any():
                 raise BrokenPromise(f"field {name!r} is infinite")
+    if sequence.volume is not None:
+        _check_volume(sequence.volume, len(sequence), sequence.n_vertices)
     if sequence.polygons is not None and int(np.sum(np.asarray(sequence.polygons) - 2)) != len(sequence.faces):
         raise BrokenPromise("polygons and triangles do not fit")
     for part in sequence.parts:
@@ -58,6 +61,19 @@ def check_asset(sequence: MeshSequence, infinite: bool = False) -> None:
     for note in sequence.notes:
         check_text(note)
     _ = sequence.materials, [image.data for image in sequence.images], sequence.metadata
+
+
+def _check_volume(volume: Volume, n_frames: int, n_vertices: int) -> None:
+    nodes = volume.cells.nodes
+    if len(nodes) and not 0 <= nodes.min() <= nodes.max() < n_vertices + volume.n_points:
+        raise BrokenPromise(f"cells refer to points {nodes.min()}..{nodes.max()} of {n_vertices + volume.n_points}")
+    points = np.asarray(volume.points[max(0, n_frames - FRAMES) : n_frames])
+    if not np.isfinite(points).all():
+        raise BrokenPromise("points inside are not finite")
+    for name, field in (*volume.point_fields.items(), *volume.cell_fields.items()):
+        frames = np.asarray(field[0:FRAMES])
+        if frames.dtype.kind == "f" and np.isinf(frames).any():
+            raise BrokenPromise(f"field {name!r} inside is infinite")
 
 
 def check_text(text: str) -> None:

@@ -119,6 +119,7 @@ def _scenes() -> dict[str, MeshSequence]:
     by_polygon = gvpipe.Field(np.repeat(cells.by_cell(), 2, axis=1).astype(np.float64) + 1e7, "triangle")
     return {
         "cells": cells.quads(cells=by_polygon).part(0, N_FRAMES),
+        "volume": _of_tests("io/simulation/test_volumes.py").block("mixed", shuffled=True).part(0, 3),
         "scene": scene,
         "layers": replace(scene, fields={}),
         "fields": MeshSequence(scene.positions, scene.faces, scene.fps, fields=scene.fields),

@@ -177,8 +177,10 @@ class AssetCoder:
         attributes = self._add_attributes(sections, origins, surface)
         fields = self._add_fields(sections, origins, surface, arrangement.polygons, reader if is_final else None)
         if self._volume is not None:
-            faces, n_beside = place[self._sequence.faces], sum(map(len, sections.values()))
-            sections |= self._volume.sections(permutation, place.astype(np.int64), reader, faces, n_beside, is_final)
+            shown, n_beside = (arrangement.faces, arrangement.polygons), sum(map(len, sections.values()))
+            reorder = bool(getattr(codec, "reorder", False))
+            place_of = place.astype(np.int64)
+            sections |= self._volume.sections(permutation, place_of, reader, shown, n_beside, reorder, is_final)
         metadata = _with_losses(self._sequence)
         if len(metadata.times) == encoded.bitstream.n_frames:
             sections[TIMES] = pack_times(metadata.times)

@@ -15,13 +15,14 @@ from gvpipe.asset_coding.directory import CODED, REDUCED, Listed
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.reduction import NO_REDUCTION
 from gvpipe.asset_coding.scan import Scan, scan_field
-from gvpipe.asset_coding.volume_list import CELLS, ORDER, POINTS, SECTION, VolumeList, pack_volume
+from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, IN_ORDER, ORDER, POINTS, SECTION, VolumeList, pack_volume
 from gvpipe.coding.codec import FrameReader
+from gvpipe.connectivity.cell_traversal import encode_walk
 from gvpipe.connectivity.cells import encode_cells, encode_order
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.graph import FieldGraph
 from gvpipe.fields.values import FieldBound
-from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.grids.borders import cell_edges, cells_behind, inner_edges, node_edges
 from gvpipe.grids.cells import Cells
@@ -72,7 +73,14 @@ class VolumeCoder:
         return scan, found.bound, holes
 
     def sections(
-        self, permutation: Int64, place: Int64, reader: FrameReader, faces: Array, n_beside: int, is_final: bool = True
+        self,
+        permutation: Int64,
+        place: Int64,
+        reader: FrameReader,
+        shown: tuple[Int32, Int32 | None],
+        n_beside: int,
+        reorder: bool = False,
+        is_final: bool = True,
     ) -> dict[str, bytes]:
         """Return the sections.
 
@@ -80,27 +88,43 @@ class VolumeCoder:
             permutation: ``(V,)`` the source's vertex of each that is decoded.
             place: its inverse.
             reader: of the decoded surface.
-            faces: ``(T, 3)`` its triangles, in the source's order.
+            shown: its triangles ``(T, 3)`` and polygons, as they are decoded.
             n_beside: bytes of the file without these sections.
+            reorder: whether cells and inner points may come in another order.
             is_final: whether points are as fine as the surface is; else those of another quality may do, whose size is alike.
         """
         key = permutation.tobytes()
         if is_final or key != self._known[0]:
-            self._known = key, self._sections(permutation, place, reader, faces, n_beside)
+            self._known = key, self._sections(permutation, place, reader, shown, n_beside, reorder)
         return self._known[1]
 
-    def _sections(self, permutation: Int64, place: Int64, reader: FrameReader, faces: Array, n_beside: int) -> dict[str, bytes]:
+    def _sections(
+        self,
+        permutation: Int64,
+        place: Int64,
+        reader: FrameReader,
+        shown: tuple[Int32, Int32 | None],
+        n_beside: int,
+        reorder: bool,
+    ) -> dict[str, bytes]:
         volume, n_vertices = self._volume, self._sequence.n_vertices
         renamed = np.concatenate([place, np.arange(n_vertices, n_vertices + volume.n_points)])
         cells = Cells(volume.cells.types, volume.cells.offsets, renamed[volume.cells.nodes])
         order = np.arange(len(renamed)) if volume.order is None else volume.order
         order = np.concatenate([order[:n_vertices][permutation], order[n_vertices:]])
-        made = {
-            CELLS: encode_cells(Cells(cells.types, cells.offsets, order[cells.nodes])),
-            ORDER: encode_order(order, n_vertices),
-        }
+        keeps = not reorder or bool(volume.blocks)
+        in_order = bytes([IN_ORDER]) + encode_cells(Cells(cells.types, cells.offsets, order[cells.nodes]))
+        walked = encode_walk(cells, *shown, (n_vertices, len(order)), keeps)
+        rows = {"point": np.arange(volume.n_points), "cell": np.arange(len(cells.types))}
+        made = {CELLS: in_order, ORDER: encode_order(order, n_vertices)}
+        if walked is not None and len(walked[0]) < len(in_order):
+            made[CELLS] = bytes([BY_WALK]) + walked[0]
+            if not keeps:
+                made[ORDER] = encode_order(None, n_vertices)
+                cells = walked[1].cells
+                rows = {"point": walked[1].points[n_vertices:] - n_vertices, "cell": walked[1].sources}
         bound = self._point_bound(reader, permutation)
-        behind = cells_behind(cells, faces, self._sequence.polygons)
+        behind = cells_behind(cells, *shown)
         is_inner = np.ones(len(cells.types), bool)
         is_inner[behind[behind >= 0]] = False
         graphs = {
@@ -108,9 +132,9 @@ class VolumeCoder:
             "cell": FieldGraph(_among(cell_edges(cells), is_inner), int(is_inner.sum()), "cell"),
         }
         if volume.n_points:
-            points = volume.points
+            points, inner = volume.points, rows["point"]
             made[POINTS] = encode_field(
-                lambda start, stop: np.asarray(points[start:stop], np.float32),
+                lambda start, stop: np.asarray(points[start:stop], np.float32)[:, inner],
                 points.shape[0],
                 graphs["point"],
                 FieldBound(bound) if bound else FieldBound(exact=True),
@@ -118,7 +142,7 @@ class VolumeCoder:
                 n_beside=n_beside,
             )
         listed = []
-        rows = {"point": np.arange(volume.n_points), "cell": np.flatnonzero(is_inner)}
+        rows["cell"] = rows["cell"][is_inner]
         for number, (domain, name, field, scan, limit, holes) in enumerate(self._numbers):
             section = f"{PREFIXES[domain]}{number}"
             listed.append(_listed(name, field, domain, limit, section, scan))

@@ -1,6 +1,7 @@
 """Section ``volume``: what lies inside of a surface, as deflated JSON that lists the sections which hold it.
 
-``volume.cells`` and ``volume.order`` are those of `gvpipe.connectivity.cells`; ``volume.points``, ``volume.point.i`` and
+``volume.cells`` is a byte and what `gvpipe.connectivity.cells` or `gvpipe.connectivity.cell_traversal` writes; ``volume.order``
+is that of `gvpipe.connectivity.cells`; ``volume.points``, ``volume.point.i`` and
 ``volume.cell.i`` are fields (`gvpipe.fields`) of one frame or of all, whose rows are the inner points, or the cells of which no
 face is a polygon of the surface: the others have the surface's numbers.
 """
@@ -16,6 +17,7 @@ from gvpipe.foundation.budget import UNLIMITED, Budget
 
 SECTION, CELLS, ORDER, POINTS = "volume", "volume.cells", "volume.order", "volume.points"
 VERSION = 1
+IN_ORDER, BY_WALK = 0, 1  # first byte of `CELLS`: how they are coded
 MAX_BYTES = 1 << 24
 MOST_CELLS = 1 << 30
 MOST_POINTS = 1 << 24

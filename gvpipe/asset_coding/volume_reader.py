@@ -11,7 +11,7 @@ from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset_coding.directory import CODED, REDUCED, Listed
 from gvpipe.asset_coding.reduction import NO_REDUCTION
-from gvpipe.asset_coding.volume_list import CELLS, ORDER, POINTS, SECTION, VERSION, VolumeList, unpack_volume
+from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, IN_ORDER, ORDER, POINTS, SECTION, VERSION, VolumeList, unpack_volume
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.arrays import Array, Int32
 from gvpipe.foundation.errors import InputError, corrupt_section, in_file
@@ -64,6 +64,7 @@ class _VolumeReader:
         fields: Mapping[str, Field],
         path: str,
     ) -> None:
+        from gvpipe.connectivity.cell_traversal import decode_walk
         from gvpipe.connectivity.cells import decode_cells, decode_order
         from gvpipe.fields.graph import FieldGraph
         from gvpipe.grids.borders import cell_edges, cells_behind, inner_edges, node_edges
@@ -77,8 +78,15 @@ class _VolumeReader:
         memory = BYTES_PER_CELL * listed.cells + BYTES_PER_POINT * n_points
         budget.keep("the volume", memory, SECONDS_PER_CELL * listed.cells + SECONDS_PER_POINT * n_points)
         self._order = decode_order(bitstream.section(ORDER), n_vertices, n_points, ORDER, budget)
-        cells = decode_cells(bitstream.section(CELLS), listed.cells, n_points, CELLS, budget)
-        if self._order is not None:
+        data = bitstream.section(CELLS)
+        is_walk = data[:1] == bytes([BY_WALK])
+        if not is_walk and data[:1] != bytes([IN_ORDER]):
+            raise corrupt_section(CELLS, f"it is coded by way {data[:1].hex() or 'none'}")
+        if is_walk:
+            cells = decode_walk(data[1:], surface, (n_vertices, n_points), listed.cells, CELLS, budget)
+        else:
+            cells = decode_cells(data[1:], listed.cells, n_points, CELLS, budget)
+        if self._order is not None and not is_walk:
             row = np.empty(n_points, np.int64)
             row[self._order] = np.arange(n_points)
             cells = Cells(cells.types, cells.offsets, row[cells.nodes])
@@ -118,6 +126,8 @@ class _VolumeReader:
 
         bitstream = self._bitstream
         reader = FieldReader(bitstream.section(section), n_frames, self._graphs[domain], section, budget=bitstream.budget)
+        if "derived" in reader.modes:
+            raise corrupt_section(section, "its values follow from positions of the surface")
         if reader.n_components != n_components or reader.dtype.name != dtype:
             raise corrupt_section(section, f"it does not hold what the section {SECTION!r} lists")
         return reader.read

@@ -5,20 +5,16 @@ its difference from the same node of the cell before, in byte planes, deflated::
 
     cells   = [varint] number of runs, runs: [8 bits] VTK's type, [varint] cells; then packed planes, run after run
     order   = [8 bits] 0: rows are in order; 1: packed bits, 1 for points of the surface; 2: packed planes of places
-    packed  = zlib stream
-
-In planes, n rows of k numbers are 4 k n bytes: byte 0 of number 0 of all rows, then byte 1, ...; numbers are differences along
-the rows, zigzag (2 d, or -2 d - 1), as uint32.
+    packed  = deflated planes (`gvpipe.connectivity.planes`)
 """
 
 from __future__ import annotations
 
-import zlib
-
 import numpy as np
 
+from gvpipe.connectivity.planes import deflated, from_planes, inflated, to_planes
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.arrays import Int64
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import corrupt_section
 from gvpipe.grids.cells import SIZE_OF_TYPE, VOLUMES, Cells
@@ -35,8 +31,8 @@ def encode_cells(cells: Cells) -> bytes:
         kind = int(cells.types[first])
         head += [bytes([kind]), varint(stop - first)]
         nodes = cells.nodes[cells.offsets[first] : cells.offsets[stop]].reshape(-1, SIZE_OF_TYPE[kind])
-        planes.append(_planes(nodes))
-    return b"".join(head) + _packed(b"".join(planes))
+        planes.append(to_planes(nodes))
+    return b"".join(head) + deflated(b"".join(planes))
 
 
 def decode_cells(data: bytes, n_cells: int, n_points: int, name: str, budget: Budget = UNLIMITED) -> Cells:
@@ -66,11 +62,11 @@ def decode_cells(data: bytes, n_cells: int, n_points: int, name: str, budget: Bu
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(SIZE_OF_TYPE[types])])
     n_nodes = int(offsets[-1])
     budget.ask(f"section {name!r}", BYTES_PER_NODE * n_nodes, SECONDS_PER_NODE * n_nodes)
-    planes = _unpacked(cursor.rest(), 4 * n_nodes, name)
+    planes = inflated(cursor.rest(), 4 * n_nodes, name)
     parts, at = [np.zeros(0, np.int64)], 0
     for kind, count in runs:
         size = 4 * count * int(SIZE_OF_TYPE[kind])
-        parts.append(_rows(planes[at : at + size], count).reshape(-1))
+        parts.append(from_planes(planes[at : at + size], count).reshape(-1))
         at += size
     nodes = np.concatenate(parts)
     if len(nodes) and not 0 <= int(nodes.min()) <= int(nodes.max()) < n_points:
@@ -85,8 +81,8 @@ def encode_order(order: Int64 | None, n_surface: int) -> bytes:
     if _rises(order[:n_surface]) and _rises(order[n_surface:]):
         is_surface = np.zeros(len(order), bool)
         is_surface[order[:n_surface]] = True
-        return bytes([BY_MASK]) + _packed(np.packbits(is_surface).tobytes())
-    return bytes([BY_PLACE]) + _packed(_planes(order[:, None]))
+        return bytes([BY_MASK]) + deflated(np.packbits(is_surface).tobytes())
+    return bytes([BY_PLACE]) + deflated(to_planes(order[:, None]))
 
 
 def decode_order(data: bytes, n_surface: int, n_points: int, name: str, budget: Budget = UNLIMITED) -> Int64 | None:
@@ -97,7 +93,7 @@ def decode_order(data: bytes, n_surface: int, n_points: int, name: str, budget: 
         return None
     budget.ask(f"section {name!r}", BYTES_PER_NODE * n_points)
     if kind == BY_MASK:
-        bits = np.frombuffer(_unpacked(cursor.rest(), (n_points + 7) // 8, name), np.uint8)
+        bits = np.frombuffer(inflated(cursor.rest(), (n_points + 7) // 8, name), np.uint8)
         is_surface = np.unpackbits(bits)[:n_points].astype(bool)
         order = np.concatenate([np.flatnonzero(is_surface), np.flatnonzero(~is_surface)])
         if int(is_surface.sum()) != n_surface:
@@ -105,7 +101,7 @@ def decode_order(data: bytes, n_surface: int, n_points: int, name: str, budget: 
         return order
     if kind != BY_PLACE:
         raise corrupt_section(name, f"it is of kind {kind}")
-    order = _rows(_unpacked(cursor.rest(), 4 * n_points, name), n_points)[:, 0]
+    order = from_planes(inflated(cursor.rest(), 4 * n_points, name), n_points)[:, 0]
     if not np.array_equal(np.sort(order), np.arange(n_points)):
         raise corrupt_section(name, "it does not have each place once")
     return order
@@ -113,34 +109,3 @@ def decode_order(data: bytes, n_surface: int, n_points: int, name: str, budget: 
 
 def _rises(values: Int64) -> bool:
     return bool((np.diff(values) > 0).all())
-
-
-def _planes(rows: Int64) -> bytes:
-    """``(n, k)`` numbers below 2^31 as planes."""
-    differences = np.diff(rows, axis=0, prepend=0)
-    zigzag = np.where(differences >= 0, 2 * differences, -2 * differences - 1).astype("<u4")
-    return np.ascontiguousarray(zigzag).view(np.uint8).reshape(len(rows), -1).T.tobytes()
-
-
-def _rows(planes: bytes, count: int) -> Int64:
-    """Mirror of `_planes`."""
-    if not count:
-        return np.zeros((0, 1), np.int64)
-    bytes_: Array = np.frombuffer(planes, np.uint8).reshape(-1, count).T
-    zigzag = np.ascontiguousarray(bytes_).view("<u4").astype(np.int64)
-    return np.asarray(np.cumsum(np.where(zigzag & 1, -(zigzag >> 1) - 1, zigzag >> 1), axis=0))
-
-
-def _packed(data: bytes) -> bytes:
-    return zlib.compress(data, 9)
-
-
-def _unpacked(data: bytes, n_bytes: int, name: str) -> bytes:
-    inflater = zlib.decompressobj()
-    try:
-        found = inflater.decompress(data, n_bytes + 1)
-    except zlib.error as exc:
-        raise corrupt_section(name, f"it does not inflate ({exc})") from exc
-    if len(found) != n_bytes or not inflater.eof or inflater.unused_data:
-        raise corrupt_section(name, f"it does not hold {n_bytes} bytes")
-    return found

@@ -179,7 +179,7 @@ def _guess(state: Filter, n: int) -> float:
         own *= own
         total += own * guess
         trust += own
-    return total / trust
+    return total / trust if trust > 0 else 0.0  # errors of a damaged file may be infinite
 
 
 @compiled

@@ -57,6 +57,25 @@ def cell_edges(cells: Cells) -> Int64:
     return np.stack([known.cells[order[same]], known.cells[order[same + 1]]], axis=1).astype(np.int64)
 
 
+def face_neighbours(cells: Cells) -> Int64 | None:
+    """``(M, 6)`` the cell behind each face, in the order of `VOLUMES`, -1 for none; None where three cells share a face."""
+    known = faces_of(cells)
+    ids, _ = row_ids(known.nodes)
+    counts = np.bincount(ids)
+    if counts.max(initial=0) > 2:
+        return None
+    total = np.bincount(ids, known.cells).astype(np.int64)
+    behind = np.where(counts[ids] == 2, total[ids] - known.cells, -1)
+    across = np.full((len(cells.types), 6), -1, np.int64)
+    at = 0
+    for kind in (kind for kind in VOLUMES if (cells.types == kind).any()):
+        some = np.flatnonzero(cells.types == kind)
+        for number in range(len(VOLUMES[kind])):
+            across[some, number] = behind[at : at + len(some)]
+            at += len(some)
+    return across
+
+
 def node_edges(cells: Cells) -> Int64:
     """``(E, 2)`` pairs of nodes that follow each other around a face of a volume cell."""
     pairs = [np.zeros((0, 2), np.int64)]

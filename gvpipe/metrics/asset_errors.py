@@ -14,6 +14,7 @@ import numpy as np
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.foundation.arrays import Array, Float64, Int64, Integers
+from gvpipe.grids.volume import Volume
 from gvpipe.metrics.correspondence import match_corners
 from gvpipe.model.sequence import MeshSequence
 
@@ -73,7 +74,7 @@ def compare_volumes(reference: MeshSequence, distorted: MeshSequence) -> AssetEr
     if ours is None and theirs is None:
         return {}
     result: AssetErrors = {"(points)": {"max": None, "mean": None}}
-    if ours is None or theirs is None or ours.points.shape != theirs.points.shape:
+    if ours is None or theirs is None or ours.points.shape != theirs.points.shape or not _same_cells(ours, theirs):
         return result
     apart = distorted.origin - reference.origin
     lengths = []
@@ -88,6 +89,13 @@ def compare_volumes(reference: MeshSequence, distorted: MeshSequence) -> AssetEr
             if a is not None and b is not None and (*a.shape[:2], a.n_components) == (*b.shape[:2], b.n_components):
                 result[name] = _errors(_field_differences(a, b, np.arange(a.shape[1])))
     return result
+
+
+def _same_cells(ours: Volume, theirs: Volume) -> bool:
+    """Whether the cells of two grids have the same points, by the grids' own numbers."""
+    same_types = np.array_equal(ours.cells.types, theirs.cells.types)
+    mine, others = (each.cells.nodes if each.order is None else each.order[each.cells.nodes] for each in (ours, theirs))
+    return same_types and np.array_equal(mine, others)
 
 
 def _field_differences(ours: Field, theirs: Field, rows: Integers) -> list[Float64]:

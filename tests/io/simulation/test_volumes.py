@@ -12,14 +12,16 @@ import pytest
 from folders import ROOT
 
 import gvpipe
-from gvpipe.asset_coding.volume_list import CELLS, ORDER, POINTS, SECTION, VolumeList, pack_volume
+from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, ORDER, POINTS, SECTION, VolumeList, pack_volume
 from gvpipe.asset_coding.volume_reader import read_volume
+from gvpipe.connectivity.cell_traversal import decode_walk, encode_walk
 from gvpipe.connectivity.cells import decode_cells, decode_order, encode_cells, encode_order
 from gvpipe.container.mp4 import read_file
 from gvpipe.foundation.errors import CorruptFile, InputError, OverBudget
 from gvpipe.grids.borders import cell_edges, cells_behind, node_edges
 from gvpipe.grids.cells import Cells, equal_cells, join_cells, structured_cells
 from gvpipe.grids.volume import Volume
+from gvpipe.io.simulation.surface import extract_surface
 
 SAMPLE = runpy.run_path(str(ROOT / "samples" / "volume.py"), run_name="volume")
 SIZES, N_FRAMES = (7, 6, 5), 6
@@ -37,6 +39,46 @@ def write_block(path: Path, tetrahedra: bool = False) -> Path:
         listed.append(f'<DataSet timestep="{k}" file="{folder.name}/{k}.vtu"/>')
     path.write_text(f'<VTKFile type="Collection"><Collection>{"".join(listed)}</Collection></VTKFile>')
     return path
+
+
+def block(kind: str = "hexahedra", shuffled: bool = False) -> gvpipe.MeshSequence:
+    """The same in memory; shuffled: points and cells in a random order."""
+    nodes = SAMPLE["tetrahedra" if kind == "tetrahedra" else "hexahedra"](SIZES)
+    frames = list(SAMPLE["frames"](SIZES, N_FRAMES))
+    rng = np.random.default_rng(3)
+    n_points = len(frames[0].points)
+    place = rng.permutation(n_points) if shuffled else np.arange(n_points)
+    nodes = place[nodes][rng.permutation(len(nodes)) if shuffled else slice(None)]
+    cells = equal_cells(10 if kind == "tetrahedra" else 12, nodes)
+    if kind == "mixed":
+        cells = cut(nodes)
+    back = np.argsort(place)
+    points = np.stack([frame.points[back] for frame in frames]).astype(np.float32)
+    heat = np.stack([frame.temperature[back] for frame in frames]).astype(np.float32)
+    surface = extract_surface(cells, points[0])
+    inner = np.setdiff1d(cells.nodes, surface.points)
+    rows = np.concatenate([surface.points, inner])
+    number = np.argsort(rows)
+    own = Cells(cells.types, cells.offsets, number[cells.nodes])
+    energy = np.repeat(np.arange(N_FRAMES, dtype=np.float32)[:, None], len(cells.types), 1) + np.arange(len(cells.types)) % 7
+    volume = Volume(
+        own,
+        points[:, inner],
+        np.argsort(number),
+        {"heat": gvpipe.Field(heat[:, inner], "point")},
+        {"energy": gvpipe.Field(energy.astype(np.float32), "cell")},
+    )
+    fields = {"heat": heat[:, surface.points], "energy": gvpipe.Field(energy[:, surface.cells].astype(np.float32), "triangle")}
+    return gvpipe.MeshSequence(
+        points[:, surface.points], surface.faces, 25, fields=fields, polygons=surface.polygons, volume=volume, name="block"
+    )
+
+
+def cut(nodes: np.ndarray) -> Cells:
+    """Hexahedra of which some are two wedges."""
+    wedges = nodes[::2]
+    halves = np.concatenate([wedges[:, [0, 1, 2, 4, 5, 6]], wedges[:, [0, 2, 3, 4, 6, 7]]])
+    return join_cells([equal_cells(12, nodes[1::2]), equal_cells(13, halves)], [0, 0])
 
 
 def volume_of(sequence: gvpipe.MeshSequence) -> Volume:
@@ -146,6 +188,56 @@ def test_still_numbers_take_one_frame(tmp_path: Path) -> None:
     gvpipe.write(gvpipe.read(tmp_path / "a.mp4"), tmp_path / "b.pvd")
     again = volume_of(gvpipe.read(tmp_path / "b.pvd", volume=True))
     assert np.array_equal(again.point_fields["temperature"][:][0], found.point_fields["temperature"][0])
+
+
+@pytest.mark.parametrize("reorder", [False, True])
+@pytest.mark.parametrize("kind", ["hexahedra", "tetrahedra", "mixed"])
+def test_a_walk_codes_cells_in_any_order(tmp_path: Path, kind: str, reorder: bool) -> None:
+    """Shuffled grids come back as they were, or, reordered, as the same cells of the same points."""
+    given = block(kind, shuffled=True)
+    gvpipe.encode(given, tmp_path / "a.mp4", "pca", quality=95, reorder=reorder)
+    with gvpipe.open(tmp_path / "a.mp4") as video:
+        assert video.bitstream.sections[CELLS][0] == BY_WALK
+        found = video.sequence()
+        ours, theirs = volume_of(given), volume_of(found)
+        if not reorder:
+            assert order_of(found)[theirs.cells.nodes].tolist() == order_of(given)[ours.cells.nodes].tolist()
+            assert gvpipe.compare(given, video).volume["heat"]["max"] is not None
+        else:
+            assert theirs.order is None and "heat" not in gvpipe.compare(given, video).volume
+        assert middles(given) == middles(found)
+        for k in (0, N_FRAMES - 1):
+            a, b = np.sort(ours.cell_fields["energy"][k]), np.sort(theirs.cell_fields["energy"][k])
+            assert np.abs(a - b).max() <= 0.02
+
+
+def middles(sequence: gvpipe.MeshSequence) -> list[Any]:
+    """Where the cells of the first frame are, rounded, in any order."""
+    volume = volume_of(sequence)
+    points = np.concatenate([sequence[0], np.asarray(volume.points[0:1])[0]])
+    sums = np.add.reduceat(points[volume.cells.nodes], volume.cells.offsets[:-1], axis=0)
+    return sorted(np.rint(20 * sums / volume.cells.sizes[:, None]).astype(int).tolist())
+
+
+def test_damaged_walks_are_refused_or_give_cells() -> None:
+    """Whatever bytes there are, no kernel reads outside of its arrays, and no more cells come than are asked for."""
+    given = block("tetrahedra", shuffled=True)
+    volume = volume_of(given)
+    counts = given.n_vertices, given.n_vertices + volume.n_points
+    for keeps in (False, True):
+        found = encode_walk(volume.cells, given.faces, given.polygons, counts, keeps)
+        assert found is not None
+        data, n_cells = found[0], len(volume.cells.types)
+        rng = np.random.default_rng(2)
+        for _ in range(300):
+            broken = bytearray(data)
+            for at in rng.integers(0, len(data), 3):
+                broken[at] = rng.integers(0, 256)
+            try:
+                cells = decode_walk(bytes(broken), (given.faces, given.polygons), counts, n_cells, CELLS)
+            except CorruptFile:
+                continue
+            assert len(cells.types) == n_cells and 0 <= cells.nodes.min() <= cells.nodes.max() < counts[1]
 
 
 def test_cells_and_orders_come_back() -> None:
