@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from gvpipe.asset.part import Part
     from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.foundation.errors import GvpipeError
+    from gvpipe.grids.cells import Cells
+    from gvpipe.grids.volume import Volume
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
     from gvpipe.metrics.comparison import Comparison
     from gvpipe.model.sequence import MeshSequence
@@ -41,6 +43,7 @@ __all__ = [
     "Attribute",
     "BatchReport",
     "Camera",
+    "Cells",
     "Comparison",
     "ExportReport",
     "Field",
@@ -58,6 +61,7 @@ __all__ = [
     "Restreamed",
     "Skin",
     "Texture",
+    "Volume",
     "compare",
     "decode",
     "encode",
@@ -81,6 +85,8 @@ _HOMES = {
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
     "gvpipe.asset.metadata": ("Metadata",),
+    "gvpipe.grids.cells": ("Cells",),
+    "gvpipe.grids.volume": ("Volume",),
     "gvpipe.asset.part": ("Part",),
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
