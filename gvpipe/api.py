@@ -411,6 +411,7 @@ def render(
     log: bool = False,
     parts: str | Sequence[str] = (),
     plain: bool = False,
+    cut: str | None = None,
     clip: str | None = None,
     mesh: StrPath | None = None,
     frames: tuple[int, int | None] | None = None,
@@ -443,7 +444,9 @@ def render(
         log: let colours follow the logarithm of the field; what is not above 0 is grey.
         parts: the name of the part to paint, or several; none: all.
         plain: paint the shape alone, without materials and colours.
-        clip, mesh, frames, fps: of the source, as for `read`.
+        cut: a plane across an axis, above which all is left out: ``"x=0.3"`` (model units), ``"x=30%"`` (of the first frame's
+            box), ``"-x=0.3"`` (what lies below is left out). What it shows of a volume is filled.
+        clip, mesh, frames, fps: of the source, as for `read`; with a plane a simulation's volume is read, too.
         progress: called with ``"render"`` and the part that is done.
         unlimited: as for `read`.
 
@@ -473,6 +476,7 @@ def render(
         log=log,
         parts=(parts,) if isinstance(parts, str) else tuple(parts),
         plain=plain,
+        cut=cut,
     )
     check_output(target, options)
     for given in (source, error_of):
@@ -483,7 +487,7 @@ def render(
         sequence = source if frames is None else source.part(*frame_range(source, *frames))
         sequence = sequence if fps is None else sequence.with_fps(fps)
     else:
-        sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited)
+        sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited, volume=cut is not None)
     return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
 
 

@@ -27,7 +27,7 @@ Float64 = NDArray[np.float64]
 
 
 class Frame(NamedTuple):
-    """Points ``(N, 3)`` in metres, numbers of points ``(N,)`` and ``(N, 3)``, and of hexahedra ``(M,)``."""
+    """Points ``(N, 3)`` in metres, numbers of points ``(N,)`` and ``(N, 3)``, and of cells ``(M,)``."""
 
     points: Float64
     temperature: Float64
@@ -49,12 +49,12 @@ def tetrahedra(sizes: tuple[int, int, int] = SIZES) -> NDArray[np.int64]:
     return hexahedra(sizes)[:, SPLIT].reshape(-1, 4)
 
 
-def frames(sizes: tuple[int, int, int] = SIZES, n_frames: int = N_FRAMES) -> Iterator[Frame]:
-    """Yield the block at each moment."""
+def frames(sizes: tuple[int, int, int] = SIZES, n_frames: int = N_FRAMES, cut: bool = False) -> Iterator[Frame]:
+    """Yield the block at each moment; ``cut``: as tetrahedra."""
     z, y, x = np.meshgrid(*(np.linspace(0, 1, n) for n in sizes[::-1]), indexing="ij")
     rest = bent(np.stack([x, y, z], axis=-1).reshape(-1, 3))
     heat = np.full(x.shape, 20.0)
-    cells = hexahedra(sizes)
+    cells = tetrahedra(sizes) if cut else hexahedra(sizes)
     for k in range(n_frames):
         shift, velocity = swing(rest, k)
         points = rest + shift
@@ -110,10 +110,9 @@ def main() -> None:
     folder = given.target.with_suffix("")
     folder.mkdir(exist_ok=True)
     listed = []
-    for k, frame in enumerate(frames(sizes, given.frames)):
-        energy = np.repeat(frame.energy, len(SPLIT)) if given.tetrahedra else frame.energy
+    for k, frame in enumerate(frames(sizes, given.frames, given.tetrahedra)):
         name = f"{folder.name}_{k:04d}.vtu"
-        (folder / name).write_bytes(vtu(frame._replace(energy=energy), nodes))
+        (folder / name).write_bytes(vtu(frame, nodes))
         listed.append(f'<DataSet timestep="{k / 100}" file="{folder.name}/{name}"/>')
     given.target.write_text(f'<VTKFile type="Collection"><Collection>{"".join(listed)}</Collection></VTKFile>')
 

@@ -544,7 +544,12 @@ def play(source: str, up: str | None, out: Output, **options: Any) -> None:
 @click.option("--log", is_flag=True, help="Let colours follow the field's logarithm; what is not above 0 is grey.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Paint this part only; repeat for more.")
 @click.option("--plain", "--no-textures", "plain", is_flag=True, help="Leave out materials, textures and colours.")
-@click.option("--clip", metavar="NAME", help="The animation to paint, of a file that has several. [default: the first]")
+@click.option(
+    "--clip",
+    metavar="NAME|x=0.3",
+    help="The animation to paint, of a file that has several [default: the first]. Or a plane: x=0.3, y=30% of the box; "
+    "what lies above is left out, below of -x=0.3. The cut of a volume is filled.",
+)
 @click.option("--mesh", metavar="FILE", help="The triangles of a point cache (.pc2, .mdd, .npy).")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1 of the input; either may be left out.")
 @click.option("--fps", type=float, help="Frames per second, instead of the input's; scenes are sampled at it.")
@@ -554,6 +559,7 @@ def render(source: str, target: str, size: str, limits: str | None, frames: str 
     """Paint a geometry video or a sequence as a picture or a film; needs no display and no GPU."""
     from gvpipe import api
     from gvpipe.cli.choices import parse_frames
+    from gvpipe.rendering.cut import is_cut
     from gvpipe.rendering.field_range import parse_range
     from gvpipe.rendering.films import parse_size
 
@@ -561,6 +567,8 @@ def render(source: str, target: str, size: str, limits: str | None, frames: str 
         raise click.UsageError("--error-max ends the colours of errors; give --error-of too", click.get_current_context())
     pixels = parse_size(size)
     options |= {"frames": parse_frames(frames), "field_range": None if limits is None else parse_range(limits)}
+    if is_cut(options["clip"]):
+        options |= {"cut": options["clip"], "clip": None}
     with source_path(source) as path, out.progress() as progress:
         notes = api.render(path, target, size=pixels, progress=progress, **options)
     for note in notes:

@@ -10,6 +10,7 @@ from gvpipe.asset.field import Field
 from gvpipe.foundation.arguments import did_you_mean
 from gvpipe.foundation.arrays import Array, Float64, UInt8
 from gvpipe.foundation.errors import InputError
+from gvpipe.grids.volume import Volume
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import used_vertices
 from gvpipe.rasterizer.colormaps import colormap
@@ -53,21 +54,34 @@ class FieldMap:
 
     def numbers(self, frame: int) -> Float64:
         """``(R,)`` values, or magnitudes, of vertices or triangles; NaN where there is none."""
-        block = self._field.read(frame, frame + 1)[0].astype(np.float64)
-        if block.shape[1] == 1:
-            return np.asarray(block[:, 0])
-        return np.asarray(np.linalg.norm(block, axis=1))
+        return _lengths(self._field.read(frame, frame + 1)[0].astype(np.float64))
 
     def values(self, frame: int) -> Float64:
         """Values as parts of the range: ``(V,)``, or ``(T, 1)`` of triangles; NaN where there is none."""
+        parts = self._parts(self.numbers(frame))
+        return np.asarray(parts[:, None] if self.domain == "triangle" else parts)
+
+    def inside(self, volume: Volume, frame: int) -> Float64 | None:
+        """The same of inner points ``(I,)``, or of cells ``(M,)`` for a field of triangles; None where there is none."""
+        fields = volume.cell_fields if self.domain == "triangle" else volume.point_fields
+        if self._name not in fields:
+            return None
+        field = fields[self._name]
+        frame = min(frame, len(field) - 1)
+        return self._parts(_lengths(field.read(frame, frame + 1)[0].astype(np.float64)))
+
+    @property
+    def domain(self) -> str:
+        """``"vertex"`` or ``"triangle"``."""
+        return self._field.domain
+
+    def _parts(self, numbers: Float64) -> Float64:
         low, high = self.limits
-        numbers = self.numbers(frame)
         numbers[np.isinf(numbers)] = np.nan
         if self._log:
             low, high = np.log([low, high])
             numbers = np.log(numbers, out=np.full_like(numbers, np.nan), where=numbers > 0)
-        parts = (numbers - low) / (high - low) if high > low else np.where(np.isnan(numbers), np.nan, 0.5)
-        return np.asarray(parts[:, None] if self._field.domain == "triangle" else parts)
+        return np.asarray((numbers - low) / (high - low) if high > low else np.where(np.isnan(numbers), np.nan, 0.5))
 
     def legend(self, size: tuple[int, int]) -> UInt8:
         """Return a colour bar with its numbers: ``(H, w, 3) uint8``, the left edge of a picture of ``size`` (width, height).
@@ -96,3 +110,8 @@ class FieldMap:
         if found is None and self._log:
             raise InputError(f"{sequence.name}: field {self._name!r} has no value above 0 to show; leave out the log scale")
         return found or (0.0, 0.0)
+
+
+def _lengths(block: Float64) -> Float64:
+    """Numbers ``(R, 1)`` as they are, lengths of vectors ``(R, C)``: ``(R,)``."""
+    return np.asarray(block[:, 0] if block.shape[1] == 1 else np.linalg.norm(block, axis=1))

@@ -22,6 +22,8 @@ from gvpipe.model.part_choice import only_parts
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
 from gvpipe.rasterizer.renderer import Renderer, check_size
+from gvpipe.rendering.cut import parse_cut
+from gvpipe.rendering.cut_scene import CutLook, CutScene
 from gvpipe.rendering.error_map import ErrorMap
 from gvpipe.rendering.field_map import FieldMap
 from gvpipe.rendering.field_range import Range, checked_range
@@ -58,6 +60,7 @@ class Film:
         shown: whose values the colours show, in place of materials.
         legend: ``(H, w, 3) uint8``, a strip at the left.
         follow: whether the camera goes with the mesh.
+        cut: by a plane, in place of the renderer's mesh.
     """
 
     sequence: MeshSequence
@@ -68,6 +71,7 @@ class Film:
     shown: ColourMap | None = None
     legend: UInt8 | None = None
     follow: bool = False
+    cut: CutScene | None = None
 
     @property
     def fps(self) -> float:
@@ -100,8 +104,11 @@ class Film:
 
     def __getitem__(self, k: int) -> UInt8:
         frame = self.frames[k]
-        values = self.shown.values(frame) if self.shown else None
-        picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
+        if self.cut is not None:
+            picture = self.cut.draw(frame, self.camera_of(k))
+        else:
+            values = self.shown.values(frame) if self.shown else None
+            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
         if self.legend is None:
             return picture
         legend = self.legend
@@ -128,6 +135,7 @@ class PictureOptions:
         log: whether the field's colours follow the logarithm.
         parts: names of the parts to paint; none: all.
         plain: leave out materials and colours.
+        cut: a plane (`gvpipe.rendering.cut.parse_cut`); what lies above it is left out.
 
     Raises:
         InputError: an ``error_max`` that is not above 0; a field beside errors; a colour map, a range or a log scale without
@@ -149,6 +157,7 @@ class PictureOptions:
     log: bool = False
     parts: tuple[str, ...] = ()
     plain: bool = False
+    cut: str | None = None
 
     def __post_init__(self) -> None:
         if self.error_max is not None and not (math.isfinite(self.error_max) and self.error_max > 0):
@@ -232,7 +241,13 @@ def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, referenc
     samples = STILL_SAMPLES if suffix == STILL else FILM_SAMPLES
     plain = options.plain or shown is not None
     renderer = Renderer.of(sequence, (across, height), options.shading, samples, plain=plain, colors=colors)
-    return Film(sequence, frames, camera, renderer, options.turntable, shown, legend, options.follow)
+    cut = None
+    if options.cut is not None:
+        if reference is not None:
+            raise InputError("a plane and errors are asked for; leave one of both out")
+        look = CutLook((across, height), options.shading, samples, colors)
+        cut = CutScene(sequence, parse_cut(options.cut), look, shown if isinstance(shown, FieldMap) else None)
+    return Film(sequence, frames, camera, renderer, options.turntable, shown, legend, options.follow, cut)
 
 
 def _frames(sequence: MeshSequence, frame: int | None, suffix: str, turntable: bool) -> list[int]:

@@ -33,9 +33,8 @@ def write_block(path: Path, tetrahedra: bool = False) -> Path:
     folder = path.with_suffix("")
     folder.mkdir()
     listed = []
-    for k, frame in enumerate(SAMPLE["frames"](SIZES, N_FRAMES)):
-        energy = np.repeat(frame.energy, 6) if tetrahedra else frame.energy
-        (folder / f"{k}.vtu").write_bytes(SAMPLE["vtu"](frame._replace(energy=energy), nodes))
+    for k, frame in enumerate(SAMPLE["frames"](SIZES, N_FRAMES, tetrahedra)):
+        (folder / f"{k}.vtu").write_bytes(SAMPLE["vtu"](frame, nodes))
         listed.append(f'<DataSet timestep="{k}" file="{folder.name}/{k}.vtu"/>')
     path.write_text(f'<VTKFile type="Collection"><Collection>{"".join(listed)}</Collection></VTKFile>')
     return path
