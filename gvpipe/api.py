@@ -295,9 +295,9 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     return Restreamed(chosen, bitstream.n_bytes, size)
 
 
-def open(path: StrPath, *, unlimited: bool = False) -> Player:
+def open(path: StrPath, *, unlimited: bool = False, shared: Callable[[str], bytes] | None = None) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
-    return Player(path, unlimited=unlimited)
+    return Player(path, unlimited=unlimited, shared=shared)
 
 
 def compare(

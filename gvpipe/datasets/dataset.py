@@ -16,10 +16,10 @@ import numpy as np
 from gvpipe.coding.codec import ClosableReader, FrameReader, LevelReader
 from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import read_bytes
+from gvpipe.container.mp4 import file_bytes, read_bytes
 from gvpipe.container.shared_parts import SharedParts
-from gvpipe.container.sources import FileSource
 from gvpipe.datasets.shard_index import Place, Sample, index_shard
+from gvpipe.datasets.shared import SharedSections, open_source
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.arrays import Float32, Int32
 from gvpipe.foundation.errors import FormatError, InputError, corrupt, in_file, quote
@@ -48,10 +48,13 @@ class Dataset:
     def __init__(self, shards: Sequence[str], *, unlimited: bool = False) -> None:
         self.shards = list(shards)
         self._unlimited = unlimited
-        self._sources = [_source(path) for path in self.shards]
+        self._sources = [open_source(path) for path in self.shards]
         self._places: list[tuple[int, Sample]] = []
+        self._sections: list[SharedSections] = []  # of each shard
         for k, path in enumerate(self.shards):
-            self._places += [(k, sample) for sample in index_shard(path)]
+            index = index_shard(path)
+            self._places += [(k, sample) for sample in index.samples]
+            self._sections.append(SharedSections([(self._sources[k], index.shared)]))
         self._numbers: dict[str, int] = {}
         for number, (k, sample) in enumerate(self._places):
             first = self._numbers.setdefault(sample.key, number)
@@ -103,15 +106,21 @@ class Dataset:
         _check_view(ALL, lod)
         return self._decode(self.number(sample), slice(0, 0), lod, True)[1]
 
+    def description_text(self, sample: int | str) -> bytes:
+        """Return the JSON of a sample as its shard has it; empty if it has none."""
+        number = self.number(sample)
+        place = self._places[number][1].description
+        with in_file(self._name(number)):
+            return self._bytes(number, place, MAX_JSON) if place.length else b""
+
     def description(self, sample: int | str) -> dict[str, Any]:
         """Return the JSON object of a sample; empty if it has none."""
-        number = self.number(sample)
-        with in_file(self._name(number)):
-            place = self._places[number][1].description
-            if not place.length:
+        text = self.description_text(sample)
+        with in_file(self._name(self.number(sample))):
+            if not text:
                 return {}
             try:
-                found = json.loads(self._bytes(number, place, MAX_JSON))
+                found = json.loads(text)
             except (ValueError, RecursionError) as exc:
                 raise corrupt(f"its description is not JSON ({exc})") from exc
             if not isinstance(found, dict):
@@ -121,13 +130,27 @@ class Dataset:
     def open(self, sample: int | str) -> Player:
         """Open a sequence with all that it has, as `gvpipe.open` does."""
         number = self.number(sample)
-        return Player(self._name(number), unlimited=self._unlimited, data=self._video(number))
+        data, shared = self._video(number), self._sections[self._places[number][0]]
+        return Player(self._name(number), unlimited=self._unlimited, data=data, shared=shared)
+
+    def whole_file(self, sample: int | str) -> bytes:
+        """Return a sample's geometry video as it was packed, with the sections that it shares with others of its shard."""
+        number = self.number(sample)
+        data, bitstream = self._video(number), self.bitstream(number)
+        return data if bitstream.n_bytes == len(data) else file_bytes(bitstream)
 
     def bitstream(self, sample: int | str) -> Bitstream:
         """Return the coded sequence, whose checksums hold."""
         number = self.number(sample)
-        bitstream = read_bytes(self._video(number), self._name(number), self._unlimited)
+        shared = self._sections[self._places[number][0]]
+        bitstream = read_bytes(self._video(number), self._name(number), self._unlimited, shared)
         return replace(bitstream, shared=self._shared)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all geometry videos in the shards, and of the sections that they share."""
+        videos = sum(sample.video.length for _, sample in self._places)
+        return videos + sum(sections.n_bytes for sections in self._sections)
 
     def samples(self, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None) -> Samples:
         """The same sequences, of which samples have some frames or a coarser mesh, or are transformed."""
@@ -224,13 +247,6 @@ class Samples:
 
     def __iter__(self) -> Iterator[Any]:
         return (self[k] for k in range(len(self)))
-
-
-def _source(path: str) -> FileSource:
-    try:
-        return FileSource(path)
-    except OSError as exc:
-        raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path and its permissions") from exc
 
 
 def _check_view(frames: object, lod: object) -> None:
