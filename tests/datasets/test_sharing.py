@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from folders import GOLDEN
 from sequences import waving
 
 import gvpipe
@@ -94,6 +95,21 @@ def test_layout(shard: Path) -> None:
     first = list(members).index("s0.mp4")
     assert all(list(members).index(name) < first + 4 for name in _shared(members))  # before the first that needs it
     assert members["plain.mp4"].count(b"gvbare") == 0  # as it was
+
+
+def test_golden_shard(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    path, expected = GOLDEN / "layouts" / "shared.tar", GOLDEN / "layouts" / "shared.npz"
+    if request.config.getoption("--write-golden"):
+        sheet = waving(SIDES[0], 2)
+        for k in range(4):
+            sequence = MeshSequence(sheet.positions[:] * np.float32(1 + k), sheet.faces, sheet.fps)
+            gvpipe.encode(sequence, tmp_path / f"s{k}.mp4", "pca", quality=20, bare=True)
+        path.unlink(missing_ok=True)
+        assert datasets.pack(tmp_path, path).shared_sections
+        np.savez(expected, **{sample["key"]: sample["positions"] for sample in datasets.open(path)})
+    wanted = np.load(expected)
+    for sample in datasets.open(path):
+        np.testing.assert_array_equal(sample["positions"], wanted[sample["key"]])
 
 
 def test_equal_folders_make_equal_shards(folder: Path, shard: Path, tmp_path: Path) -> None:
