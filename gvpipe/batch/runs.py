@@ -152,7 +152,8 @@ def _encode(
     for outcome in executor.run(prepare, pickle.dumps(dict(keywords)), tasks):
         job, done = jobs[outcome.index], _done(outcome)
         error = done.error and done.error.replace(tasks[outcome.index].source, job.source)
-        entry = Entry(job.source, done.hash, job.output, error, done.bytes, round(done.seconds, 3), __version__, settings)
+        seconds = round(done.seconds, 3)
+        entry = Entry(job.source, done.hash, job.output, error, done.bytes, seconds, __version__, settings, done.description)
         if done.is_new:
             manifest.add(entry)
         yield entry, done

@@ -290,14 +290,23 @@ def restream(source: str, target: str, layout: str | None, unlimited: bool, out:
 @click.option("--shard-size", metavar="BYTES", default="1GB", show_default=True, help="Most bytes of a shard: 500MB, 2GB.")
 @click.option("--shard-count", type=click.IntRange(1), metavar="N", help="Most sequences of a shard.")
 @click.option("--no-share", is_flag=True, help="Keep files as they are: store nothing once for files of one connectivity.")
+@click.option("--card", metavar="README.md", help="Write a data-set card: counts, errors, settings; your own text in it stays.")
 @unlimited_option
 @output_options
 def pack(
-    folder: str, target: str, shard_size: str, shard_count: int | None, no_share: bool, unlimited: bool, out: Output
+    folder: str,
+    target: str,
+    shard_size: str,
+    shard_count: int | None,
+    no_share: bool,
+    card: str | None,
+    unlimited: bool,
+    out: Output,
 ) -> None:
     """Pack the geometry videos of a folder into shards for machine learning, in WebDataset's layout.
 
-    A shard is a tar file. Each NAME.mp4 becomes NAME.mp4 and NAME.json in it, the latter with what is in NAME.json beside it.
+    A shard is a tar file. Each NAME.mp4 becomes NAME.mp4 and NAME.json in it, the latter with what is in NAME.json beside it,
+    box, mean and scale of the positions, and errors that encode-all recorded.
     A shard stores once what several bare files have in common, such as triangles, where that saves 1 % of the bytes.
     """
     from gvpipe import datasets
@@ -312,6 +321,7 @@ def pack(
             shard_bytes=limit,
             shard_sequences=shard_count,
             share=not no_share,
+            card=card,
             progress=progress,
             unlimited=unlimited,
         )

@@ -13,9 +13,12 @@ from typing import Any
 
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_bytes, read_bytes
+from gvpipe.container.shared_parts import SharedParts
 from gvpipe.container.shared_sections import MAX_SHARED, section_hash
+from gvpipe.datasets.recorded import ERRORS, Recorded
 from gvpipe.datasets.sample_names import DESCRIPTION
-from gvpipe.foundation.errors import FormatError, InputError
+from gvpipe.datasets.statistics import KEYS, describe_positions
+from gvpipe.foundation.errors import FormatError, InputError, in_file
 from gvpipe.foundation.isolation.plain_files import open_plain
 from gvpipe.foundation.progress import Progress
 
@@ -71,13 +74,24 @@ class Entry:
         return file_bytes(bitstream, shared=shared), {digest: bitstream.sections[name] for name, digest in shared.items()}
 
 
-def look_at(files: Mapping[str, Path], left_out: dict[str, str], progress: Progress | None, unlimited: bool) -> Iterator[Entry]:
-    """Yield the files that can be packed; ``left_out`` gets why the others cannot, by path."""
+def look_at(
+    files: Mapping[str, Path], recorded: Recorded, left_out: dict[str, str], progress: Progress | None, unlimited: bool
+) -> Iterator[Entry]:
+    """Yield the files that can be packed.
+
+    Args:
+        files: by key, in order.
+        recorded: of their folder.
+        left_out: gets why the others cannot be packed, by path.
+        progress, unlimited: as for `gvpipe.datasets.pack`.
+    """
+    shared = SharedParts()
     for k, (key, path) in enumerate(files.items()):
         if progress:
             progress("check", k / len(files))
         try:
-            yield _look(key, path, unlimited)
+            data = read_file(path)
+            yield _look(key, path, data, recorded.of(path, len(data)), shared, unlimited)
         except (FormatError, InputError) as exc:
             left_out[str(path)] = str(exc)
 
@@ -103,10 +117,12 @@ def read_file(path: Path) -> bytes:
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check its permissions") from exc
 
 
-def _look(key: str, path: Path, unlimited: bool) -> Entry:
-    data = read_file(path)
+def _look(key: str, path: Path, data: bytes, known: dict[str, Any], shared: SharedParts, unlimited: bool) -> Entry:
     bitstream = read_bytes(data, str(path), unlimited)
-    text = _as_json({**_beside(path), **describe(bitstream)}, path)
+    known = {name: known[name] for name in (*KEYS, *ERRORS) if known.get(name) is not None}
+    with in_file(str(path)):
+        positions = {} if known.keys() >= set(KEYS) else describe_positions(bitstream, shared)
+    text = _as_json({**_beside(path), **known, **positions, **describe(bitstream)}, path)
     try:
         tarfile.TarInfo(f"{key}.{DESCRIPTION}").tobuf(tarfile.USTAR_FORMAT)
     except ValueError as exc:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import glob
 import io
+import json
 import os
 import re
 import tarfile
@@ -18,7 +19,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from gvpipe.container.sources import check_target
+from gvpipe.datasets.card import Contents, check_card, write_card
 from gvpipe.datasets.entries import look_at
+from gvpipe.datasets.recorded import read_recorded
 from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, key_of, shared_name
 from gvpipe.datasets.shard_plan import Shard, plan_shards
 from gvpipe.foundation.arguments import StrPath, check_path
@@ -61,6 +64,7 @@ def pack(
     shard_bytes: int = SHARD_BYTES,
     shard_sequences: int | None = None,
     share: bool = True,
+    card: StrPath | None = None,
     progress: Progress | None = None,
     unlimited: bool = False,
 ) -> Packed:
@@ -74,28 +78,35 @@ def pack(
         shard_sequences: most samples of a shard; None: as many as the bytes allow.
         share: whether sections that several files have in common, such as those of one connectivity, are stored once a
             shard, where that saves 1 % of the bytes. Only files of the bare layout share.
+        card: of a page in Markdown that sums up the data set, for Hugging Face; None: none. In a page that is there, what
+            lies between ``<!-- gvpipe: begin -->`` and ``<!-- gvpipe: end -->`` is written anew, the rest stays.
         progress: called with ``"check"``, then with ``"pack"``, and the part that is done.
         unlimited: as for `gvpipe.open`.
 
     Raises:
-        InputError: there are no such files, two of them have one key, or a limit cannot be.
+        InputError: there are no such files, two of them have one key, a limit cannot be, or the card has no such lines.
         OutputError: a shard cannot be written, or is there already. Shards that are whole stay.
     """
     pattern = os.fspath(check_path(target, "the shards"))
-    for name, value in (("shard_bytes", shard_bytes), ("shard_sequences", shard_sequences)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
-            raise InputError(f"{name} is {value!r}; a whole number of 1 or more is needed")
+    card_before = "" if card is None else check_card(check_path(card, "the card"))
+    _check_limits(shard_bytes=shard_bytes, shard_sequences=shard_sequences)
     left_out: dict[str, str] = {}
-    files = _find(Path(check_path(folder, "the folder of geometry videos")), left_out)
+    place = Path(check_path(folder, "the folder of geometry videos"))
+    files = _find(place, left_out)
     is_numbered = _check_pattern(pattern)
     if not is_numbered:
         shard_bytes, shard_sequences = len(files) << 40, None
-    entries = list(look_at(files, left_out, progress, unlimited))
+    recorded = read_recorded(place)
+    entries = list(look_at(files, recorded, left_out, progress, unlimited))
     plan = plan_shards(entries, shard_bytes, shard_sequences, share)
     names = [pattern % k if is_numbered else pattern for k in range(len(plan))]
     members = _Members(len(entries), left_out, progress, unlimited)
     for name, shard in zip(names, plan, strict=True):
         _write_shard(name, members.of(shard))
+    if card is not None:
+        packed = [json.loads(entry.description) for entry in entries if str(entry.path) not in left_out]
+        together = NUMBER.sub("*", os.path.basename(pattern))
+        write_card(card, card_before, Contents(names, together, packed, recorded.settings))
     sizes = sum(map(os.path.getsize, names))
     return Packed(names, members.n_packed, sizes, left_out, len(members.shared))
 
@@ -171,6 +182,12 @@ def _find(folder: Path, left_out: dict[str, str]) -> dict[str, Path]:
             )
         files[key] = relative[path]
     return files
+
+
+def _check_limits(**limits: object) -> None:
+    for name, value in limits.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+            raise InputError(f"{name} is {value!r}; a whole number of 1 or more is needed")
 
 
 def _check_pattern(pattern: str) -> bool:
