@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from gvpipe.datasets.collating import collate
 from gvpipe.datasets.dataset import Dataset, Samples
+from gvpipe.datasets.frameworks import TorchSamples, WebDatasetDecoder, collate_tensors, torch, webdataset_decoder
 from gvpipe.datasets.opening import open, shared_sections
 from gvpipe.datasets.packing import Packed, pack
 from gvpipe.datasets.shared import SharedSections
@@ -15,10 +17,16 @@ __all__ = [
     "Samples",
     "SharedSections",
     "Summary",
+    "TorchSamples",
     "Unpacked",
+    "WebDatasetDecoder",
+    "collate",
+    "collate_tensors",
     "open",
     "pack",
     "shared_sections",
     "summarise",
+    "torch",
     "unpack",
+    "webdataset_decoder",
 ]

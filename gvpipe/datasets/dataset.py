@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.coding.codec import ClosableReader, FrameReader, LevelReader
-from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import file_bytes, read_bytes
 from gvpipe.container.shared_parts import SharedParts
+from gvpipe.datasets.decoding import ALL, check_view, decode_sample
 from gvpipe.datasets.shard_index import Place, Sample, index_shard
 from gvpipe.datasets.shared import SharedSections, open_source
 from gvpipe.foundation.arguments import show
@@ -25,7 +24,6 @@ from gvpipe.foundation.arrays import Float32, Int32
 from gvpipe.foundation.errors import FormatError, InputError, corrupt, in_file, quote
 from gvpipe.playback.player import Player
 
-ALL = slice(None)
 MAX_JSON = 1 << 24  # bytes of a sample's description
 MAX_VIDEO = 1 << 32  # bytes of a sample's video
 
@@ -98,12 +96,12 @@ class Dataset:
             TypeError: ``frames`` is no slice, or ``lod`` no integer.
             FormatError: the sample is cut or damaged.
         """
-        _check_view(frames, lod)
+        check_view(frames, lod)
         return self._decode(self.number(sample), frames, lod, False)[0]
 
     def faces(self, sample: int | str, lod: int = 0) -> Int32:
         """Return the triangles of a sequence, ``(T, 3) int32``, at a level of detail as `read` takes it."""
-        _check_view(ALL, lod)
+        check_view(ALL, lod)
         return self._decode(self.number(sample), slice(0, 0), lod, True)[1]
 
     def description_text(self, sample: int | str) -> bytes:
@@ -185,17 +183,7 @@ class Dataset:
 
     def _decode(self, number: int, frames: slice, lod: int, with_faces: bool) -> tuple[Float32, Int32, Bitstream]:
         bitstream = self.bitstream(number)
-        with in_file(self._name(number)):
-            reader = open_reader(bitstream)
-            try:
-                lod = _clip_level(reader, lod)
-                positions = _read(reader, bitstream.n_frames, frames, lod)
-                faces = _faces(reader, lod) if with_faces else np.zeros((0, 3), np.int32)
-            finally:
-                if isinstance(reader, ClosableReader):
-                    reader.close()
-        if with_faces and not lod and "asset" in bitstream.sections:  # its parts have an order of their own
-            faces = self.open(number).faces
+        positions, faces = decode_sample(bitstream, self._name(number), frames, lod, with_faces)
         return positions, faces, bitstream
 
     def _video(self, number: int) -> bytes:
@@ -230,7 +218,7 @@ class Samples:
     def __init__(
         self, dataset: Dataset, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None
     ) -> None:
-        _check_view(frames, lod)
+        check_view(frames, lod)
         if transform is not None and not callable(transform):
             raise TypeError(f"transform is {show(transform)}; a function of a sample is needed")
         self._dataset, self._frames, self._lod, self._transform = dataset, frames, lod, transform
@@ -247,30 +235,3 @@ class Samples:
 
     def __iter__(self) -> Iterator[Any]:
         return (self[k] for k in range(len(self)))
-
-
-def _check_view(frames: object, lod: object) -> None:
-    if not isinstance(frames, slice):
-        raise TypeError(f"frames are {show(frames)}; a slice is needed, such as slice(0, 8)")
-    if isinstance(lod, bool) or not isinstance(lod, int):
-        raise TypeError(f"lod is {show(lod)}; an integer is needed")
-    if lod < 0:
-        raise InputError(f"no level of detail {lod}; 0 is the mesh, higher ones are coarser")
-
-
-def _clip_level(reader: FrameReader, lod: int) -> int:
-    return min(lod, len(reader.levels) - 1) if lod and isinstance(reader, LevelReader) else 0
-
-
-def _read(reader: FrameReader, n_frames: int, frames: slice, lod: int) -> Float32:
-    """The frames of a slice, which are read as one span."""
-    wanted = range(*frames.indices(n_frames))
-    start, stop = (min(wanted[0], wanted[-1]), max(wanted[0], wanted[-1]) + 1) if wanted else (0, 0)
-    positions = reader.read(start, stop, lod=lod) if lod and isinstance(reader, LevelReader) else reader.read(start, stop)
-    return positions if wanted.step == 1 or not wanted else positions[[k - start for k in wanted]]
-
-
-def _faces(reader: FrameReader, lod: int) -> Int32:
-    """Triangles that are the caller's own: readers may share theirs."""
-    faces = reader.level_faces(lod) if lod and isinstance(reader, LevelReader) else reader.faces
-    return faces.copy()
