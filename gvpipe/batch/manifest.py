@@ -37,6 +37,7 @@ class Entry:
         gvpipe: version.
         settings: what was asked for.
         description: what a sample of a data set says of the sequence (`gvpipe.datasets`), and errors that were measured.
+        decided: the codec that all sequences of the run have, of several candidates; empty: each chose, or there was one.
     """
 
     input: str
@@ -48,6 +49,7 @@ class Entry:
     gvpipe: str
     settings: Mapping[str, Any]
     description: Mapping[str, Any] = field(default_factory=dict)
+    decided: str = ""
 
 
 TYPES: dict[str, Any] = {
@@ -60,7 +62,8 @@ TYPES: dict[str, Any] = {
     "gvpipe": str,
     "settings": dict,
 }
-ADDED: dict[str, tuple[Any, Any]] = {"description": (dict, {})}  # keys that older manifests lack: type, and what stands for it
+# keys that older manifests lack: type, and what stands for it
+ADDED: dict[str, tuple[Any, Any]] = {"description": (dict, {}), "decided": (str, "")}
 
 
 class Manifest:

@@ -56,11 +56,11 @@ def measure(blocks: Iterable[Float32]) -> dict[str, Any]:
     n, total, squared = 0, np.zeros(3), 0.0
     low, high, centre = np.full(3, np.inf), np.full(3, -np.inf), np.zeros(3)
     for block in blocks:
-        points = block.reshape(-1, 3).astype(np.float64)
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-        centre = centre if n else points.mean(axis=0)
-        points -= centre  # squares of large coordinates would cancel
-        n, total, squared = n + len(points), total + points.sum(axis=0), squared + float(np.vdot(points, points))
+        points = np.array(block.reshape(-1, 3).T, np.float64, order="C")  # (3, n V): sums of rows are fast
+        low, high = np.minimum(low, points.min(axis=1)), np.maximum(high, points.max(axis=1))
+        centre = centre if n else points.mean(axis=1)
+        points -= centre[:, None]  # squares of large coordinates would cancel
+        n, total, squared = n + points.shape[1], total + points.sum(axis=1), squared + float(np.square(points).sum())
     shift = total / n
     scale = max(0.0, squared / n - float(shift @ shift)) ** 0.5
     return {"box": [_rounded(low), _rounded(high)], "mean": _rounded(shift + centre), "scale": _rounded([scale])[0]}

@@ -92,6 +92,7 @@ def test_failures_stop_nothing_and_the_rest_is_resumed(inputs: Path, tmp_path: P
         "gvpipe": gvpipe.__version__,
         "settings": {"codecs": [{"id": "pca", "quality": 50}]},
         "description": {**describe(bitstream), **describe_positions(bitstream)},
+        "decided": "",
     }
 
     gvpipe.write(waving(4, 6), inputs / "a.npz")  # another input, a mended one, an output that has gone
