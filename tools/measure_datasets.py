@@ -3,6 +3,7 @@
     python tools/measure_datasets.py sizes ../shared/data/*.npz --json docs/benchmarks/datasets/short_sequences.json
     python tools/measure_datasets.py rates --json docs/benchmarks/datasets/shard_rates.json
     python tools/measure_datasets.py sharing --json docs/benchmarks/datasets/sharing.json
+    python tools/measure_datasets.py codecs ../shared/data/*.npz --json docs/benchmarks/datasets/codecs.json
     python tools/measure_datasets.py tables docs/benchmarks/datasets
 
 Sizes: each sequence is cut to 16 frames and encoded by codec ``auto`` in the bare layout, then changed to the plain one.
@@ -11,6 +12,7 @@ seconds are of its processor time. The same sequences lie in tar files in other 
 (package ``zstandard``, or Python 3.14), and Draco, a stream a frame, whose step keeps the same bound.
 Sharing: 500 sequences of seven irregular sheets of 500 to 3,500 vertices, packed with and without shared sections, and
 read in a random order, the least of three passes.
+Codecs: processor time, with that of processes that have ended, and bytes of codec ``pca`` and of ``auto``, 16 frames each.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import importlib
 import io
 import json
 import math
+import os
 import platform
 import sys
 import tarfile
@@ -73,9 +76,9 @@ DRACO_LEVELS = (7, 10)  # that of Draco's own command, and the smallest files
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
-    for name in ("sizes", "rates", "sharing", "tables"):
+    for name in ("sizes", "codecs", "rates", "sharing", "tables"):
         command = commands.add_parser(name)
-        if name in ("sizes", "tables"):
+        if name in ("sizes", "codecs", "tables"):
             command.add_argument("paths", nargs="+", type=Path)
         command.add_argument("--json", type=Path)
     options = parser.parse_args()
@@ -85,8 +88,13 @@ def main() -> None:
     found: dict[str, Any] = {"gvpipe": gvpipe.__version__, "python": platform.python_version(), "machine": platform.machine()}
     if options.command != "sizes":
         found |= {"cpu": describe_machine(), "libraries": _versions()}
-    measures = {"rates": measure_rates, "sharing": measure_sharing}
-    found["results"] = measure_sizes(options.paths) if options.command == "sizes" else measures[options.command]()
+    measures: dict[str, Callable[[], Any]] = {
+        "sizes": lambda: measure_sizes(options.paths),
+        "codecs": lambda: measure_codecs(options.paths),
+        "rates": measure_rates,
+        "sharing": measure_sharing,
+    }
+    found["results"] = measures[options.command]()
     text = json.dumps(found, indent=1)
     print(text)
     if options.json:
@@ -119,6 +127,23 @@ def measure_sizes(paths: list[Path]) -> list[dict[str, Any]]:
                 }
             )
             print(json.dumps(results[-1]), file=sys.stderr, flush=True)
+    return results
+
+
+def measure_codecs(paths: list[Path]) -> list[dict[str, Any]]:
+    """Processor time and bytes of each sequence's first frames, by codec ``pca`` and by ``auto``, kernels compiled before."""
+    results: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for path in sorted(paths):
+            sequence = gvpipe.read(path)
+            sequence = sequence.part(0, min(N_FRAMES, sequence.n_frames))
+            found: dict[str, Any] = {"name": path.stem}
+            for codec in ("pca", "auto"):
+                started = sum(os.times()[:4])
+                report = gvpipe.encode(sequence, Path(folder, "a.mp4"), codec, max_error=MAX_ERROR, bare=True)
+                found[codec] = {"codec": report.codec, "bytes": report.bytes, "seconds": sum(os.times()[:4]) - started}
+            results.append(found)
+            print(json.dumps(found), file=sys.stderr, flush=True)
     return results
 
 

@@ -41,7 +41,7 @@ def plan_shards(entries: Sequence[Entry], most_bytes: int, most: int | None, sha
     common = _worth_storing(entries) if share else NOTHING
     if not common:
         return alone
-    sharing = [Shard(part, _worth_storing(part)) for part in _divide(entries, common, most_bytes, most)]
+    sharing = [_fit(part, common) for part in _divide(entries, common, most_bytes, most)]
     return sharing if _n_bytes(sharing) <= (1 - LEAST_GAIN) * _n_bytes(alone) else alone
 
 
@@ -64,6 +64,11 @@ def _divide(entries: Iterable[Entry], common: frozenset[str], most_bytes: int, m
         n_bytes += size
         stored |= {section.digest for section in entry.sections.values()} & common
     return shards
+
+
+def _fit(entries: list[Entry], common: frozenset[str]) -> Shard:
+    """The smaller of two shards: what these files share is stored, or what all files share, for which there is room."""
+    return min(Shard(entries, _worth_storing(entries)), Shard(entries, common), key=lambda shard: _n_bytes([shard]))
 
 
 def _size(entry: Entry, common: frozenset[str], stored: set[str]) -> int:

@@ -232,7 +232,8 @@ def test_hostile_references(folder: Path) -> None:
         with pytest.raises(CorruptFile, match=message):
             read_bytes(file_bytes(bitstream, shared=shared), "a", find=lambda _: mesh)
     good = file_bytes(bitstream, shared={"mesh": section_hash(mesh)})
-    assert read_bytes(good, "a", find=lambda _: mesh).sections == bitstream.sections
+    found = read_bytes(good, "a", find=lambda _: mesh)
+    assert found.sections == bitstream.sections and found.n_bytes == found.budget.n_bytes == len(good) + len(mesh)
     for size in (*range(0, len(good), 97), len(good) - 1):
         with pytest.raises(FormatError):
             read_bytes(good[:size], "a", find=lambda _: mesh)
