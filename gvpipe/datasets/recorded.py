@@ -50,4 +50,6 @@ def read_recorded(folder: Path) -> Recorded:
             found = entry.get("description")
             descriptions[entry["output"]] = entry["bytes"], found if isinstance(found, dict) else {}
             settings = entry["settings"] if isinstance(entry.get("settings"), dict) else settings
+            if isinstance(entry.get("decided"), str) and entry["decided"]:
+                settings = {**settings, "decided": entry["decided"]}
     return Recorded(folder, descriptions, settings)
