@@ -27,7 +27,7 @@ from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
 from gvpipe.foundation.progress import Progress
-from gvpipe.metrics.vertex_errors import frame_diagonal
+from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.model.warp import warped
@@ -69,6 +69,8 @@ class Report:
         tried: where a target was given, or codec ``auto``: every encode that was measured (`gvpipe.rate_control.trials.Trial`).
         reason: why the encode in the file was chosen among those.
         notes: what a user should know, a line each.
+        errors: ``rmse``, ``rmse_diag``, ``max``, ``max_diag`` and ``kg`` of the file, as in `Comparison`, where a target was
+            given or codecs competed; else empty.
     """
 
     codec: str
@@ -85,6 +87,7 @@ class Report:
     tried: list[dict[str, Any]]
     reason: str
     notes: list[str]
+    errors: dict[str, float | None] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -234,6 +237,7 @@ def encode(
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
         notes=[*_notes(sequence, target, asset.plan), *_refusal(path, bitstream, size)],
+        errors={} if coded.errors is None else dataclasses.asdict(coded.errors),
     )
 
 
@@ -295,9 +299,9 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     return Restreamed(chosen, bitstream.n_bytes, size)
 
 
-def open(path: StrPath, *, unlimited: bool = False) -> Player:
+def open(path: StrPath, *, unlimited: bool = False, shared: Callable[[str], bytes] | None = None) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
-    return Player(path, unlimited=unlimited)
+    return Player(path, unlimited=unlimited, shared=shared)
 
 
 def compare(
@@ -608,13 +612,14 @@ def _target(
 
 @dataclass(frozen=True)
 class _Coded:
-    """The bitstream to write, its codec, how to check its file, and what was tried for it and why."""
+    """The bitstream to write, its codec, how to check its file, what was tried for it and why, and its errors if measured."""
 
     codec: Codec
     encoded: Encoded
     check: Callable[[Bitstream], None] | None = None
     tried: Sequence[Trial] = ()
     reason: str = ""
+    errors: Errors | None = None
 
 
 def _code(
@@ -637,7 +642,7 @@ def _code(
     trial = choice.trial
     check = partial(choice.trials.check, trial.encoded.permutation)
     encoded = dataclasses.replace(trial.encoded, bitstream=asset.add(trial.encoded, trial.codec))
-    return _Coded(trial.codec, encoded, check, choice.tried, choice.reason)
+    return _Coded(trial.codec, encoded, check, choice.tried, choice.reason, trial.errors)
 
 
 def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress, layout: str) -> tuple[int, Bitstream]:

@@ -6,6 +6,7 @@ from gvpipe.foundation.errors import CorruptFile as CorruptFile
 from gvpipe.foundation.errors import FormatError as FormatError
 from gvpipe.foundation.errors import GvpipeError as GvpipeError
 from gvpipe.foundation.errors import InputError as InputError
+from gvpipe.foundation.errors import MissingSection as MissingSection
 from gvpipe.foundation.errors import NewerVersion as NewerVersion
 from gvpipe.foundation.errors import NotGeometryVideo as NotGeometryVideo
 from gvpipe.foundation.errors import OutputError as OutputError

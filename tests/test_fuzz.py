@@ -68,8 +68,9 @@ def test_a_file_that_grows_put_together_is_the_same(tmp_path: Path) -> None:
     assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
 
 
-def test_a_shard_put_together_is_read(tmp_path: Path) -> None:
-    (seed,) = shard_seeds([GOLDEN / "pca-1-still.mp4"])
+@pytest.mark.parametrize("number", [0, 1])  # with all of its sections, and with one beside
+def test_a_shard_put_together_is_read(number: int, tmp_path: Path) -> None:
+    seed = shard_seeds([GOLDEN / "pca-1-still.mp4"])[number]
     target = shard_target((seed,))
     again = gvpipe.datasets.open(write_files(target.join(seed.parts), tmp_path / "case"))
     assert (

@@ -2,12 +2,17 @@
 
     python tools/measure_datasets.py sizes ../shared/data/*.npz --json docs/benchmarks/datasets/short_sequences.json
     python tools/measure_datasets.py rates --json docs/benchmarks/datasets/shard_rates.json
+    python tools/measure_datasets.py sharing --json docs/benchmarks/datasets/sharing.json
+    python tools/measure_datasets.py codecs ../shared/data/*.npz --json docs/benchmarks/datasets/codecs.json
     python tools/measure_datasets.py tables docs/benchmarks/datasets
 
 Sizes: each sequence is cut to 16 frames and encoded by codec ``auto`` in the bare layout, then changed to the plain one.
 Rates: sequences of one connectivity, made here, 45 x 45 vertices and 16 frames, are packed and read at random by one process;
 seconds are of its processor time. The same sequences lie in tar files in other ways, too: as .npz, .npz compressed by zstd
 (package ``zstandard``, or Python 3.14), and Draco, a stream a frame, whose step keeps the same bound.
+Sharing: 500 sequences of seven irregular sheets of 500 to 3,500 vertices, packed with and without shared sections, and
+read in a random order, the least of three passes.
+Codecs: processor time, with that of processes that have ended, and bytes of codec ``pca`` and of ``auto``, 16 frames each.
 """
 
 from __future__ import annotations
@@ -17,11 +22,13 @@ import importlib
 import io
 import json
 import math
+import os
 import platform
 import sys
 import tarfile
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -30,12 +37,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 import gvpipe
 from gvpipe import datasets
 from gvpipe.benchmark.sweep import describe_machine
-from gvpipe.foundation.arrays import Float32
+from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 
@@ -46,6 +53,7 @@ MAX_ERROR = "0.1%"
 SIDE = 45  # vertices of a side
 N_SEQUENCES = 24
 SPANS, SECONDS = 5, 0.5  # of a rate: how many, and processor time of each
+N_SHARING, TOPOLOGIES, VERTICES_STEP, PASSES = 500, 7, 500, 3
 PARTS = {
     "mesh": ("mesh",),
     "order": ("order",),
@@ -68,9 +76,9 @@ DRACO_LEVELS = (7, 10)  # that of Draco's own command, and the smallest files
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
-    for name in ("sizes", "rates", "tables"):
+    for name in ("sizes", "codecs", "rates", "sharing", "tables"):
         command = commands.add_parser(name)
-        if name != "rates":
+        if name in ("sizes", "codecs", "tables"):
             command.add_argument("paths", nargs="+", type=Path)
         command.add_argument("--json", type=Path)
     options = parser.parse_args()
@@ -78,9 +86,15 @@ def main() -> None:
         print(*tables(options.paths[0]), sep="\n")
         return
     found: dict[str, Any] = {"gvpipe": gvpipe.__version__, "python": platform.python_version(), "machine": platform.machine()}
-    if options.command == "rates":
+    if options.command != "sizes":
         found |= {"cpu": describe_machine(), "libraries": _versions()}
-    found["results"] = measure_sizes(options.paths) if options.command == "sizes" else measure_rates()
+    measures: dict[str, Callable[[], Any]] = {
+        "sizes": lambda: measure_sizes(options.paths),
+        "codecs": lambda: measure_codecs(options.paths),
+        "rates": measure_rates,
+        "sharing": measure_sharing,
+    }
+    found["results"] = measures[options.command]()
     text = json.dumps(found, indent=1)
     print(text)
     if options.json:
@@ -116,6 +130,23 @@ def measure_sizes(paths: list[Path]) -> list[dict[str, Any]]:
     return results
 
 
+def measure_codecs(paths: list[Path]) -> list[dict[str, Any]]:
+    """Processor time and bytes of each sequence's first frames, by codec ``pca`` and by ``auto``, kernels compiled before."""
+    results: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for path in sorted(paths):
+            sequence = gvpipe.read(path)
+            sequence = sequence.part(0, min(N_FRAMES, sequence.n_frames))
+            found: dict[str, Any] = {"name": path.stem}
+            for codec in ("pca", "auto"):
+                started = sum(os.times()[:4])
+                report = gvpipe.encode(sequence, Path(folder, "a.mp4"), codec, max_error=MAX_ERROR, bare=True)
+                found[codec] = {"codec": report.codec, "bytes": report.bytes, "seconds": sum(os.times()[:4]) - started}
+            results.append(found)
+            print(json.dumps(found), file=sys.stderr, flush=True)
+    return results
+
+
 def measure_rates() -> list[dict[str, Any]]:
     """Sequences per second of processor time, read from shards and from tar files of other files."""
     sequences = [make_sequence(k) for k in range(N_SEQUENCES)]
@@ -130,6 +161,38 @@ def measure_rates() -> list[dict[str, Any]]:
             results.append({"label": label, **_rates_of_tar(sequences, Path(name, "other.tar"), storage)})
             print(json.dumps(results[-1]), file=sys.stderr, flush=True)
     return results
+
+
+def measure_sharing() -> list[dict[str, Any]]:
+    """Bytes of a data set of few connectivities with and without shared sections, and processor time to pack and to read it."""
+    results = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name, "sequences")
+        folder.mkdir()
+        parts: Counter[str] = Counter()
+        for k in range(N_SHARING):
+            sequence = make_sheet(VERTICES_STEP * (1 + k % TOPOLOGIES), k)
+            parts.update(gvpipe.encode(sequence, folder / f"{k}.mp4", "pca", max_error=MAX_ERROR, bare=True).sections)
+        for share in (False, True):
+            started = time.process_time()
+            packed = datasets.pack(folder, Path(name, f"{share}.tar"), share=share)
+            seconds = time.process_time() - started
+            dataset = datasets.open(packed.shards)
+            found = {"share": share, "shard": packed.bytes, "videos": dataset.n_bytes, "sections": packed.shared_sections}
+            results.append(
+                {**found, "pack_seconds": seconds, "read_seconds": min(_pass_seconds(dataset) for _ in range(PASSES))}
+            )
+        common = sum(size for part, size in parts.items() if part.split(".")[0] in ("mesh", "order"))
+        results.append({"mesh_and_order": common, "files": sum(parts.values())})
+    return results
+
+
+def _pass_seconds(dataset: datasets.Dataset) -> float:
+    """Processor time to read all sequences once, in a random order."""
+    started = time.process_time()
+    for k in np.random.default_rng(0).permutation(len(dataset)).tolist():
+        dataset.read(k)
+    return time.process_time() - started
 
 
 def storages() -> dict[str, Storage]:
@@ -150,13 +213,22 @@ def storages() -> dict[str, Storage]:
     return found | {f"Draco, level {level}": (partial(_save_draco, level), _load_draco) for level in DRACO_LEVELS}
 
 
+def make_sheet(n_vertices: int, seed: int) -> MeshSequence:
+    """An irregular sheet, the same for each number of vertices, that four travelling waves move."""
+    points = np.random.default_rng(n_vertices).uniform(0, 1, (n_vertices, 2))
+    return _waves(np.c_[points, np.zeros(n_vertices)], Delaunay(points).simplices, seed)
+
+
 def make_sequence(seed: int) -> MeshSequence:
     """A sheet that four travelling waves move, different for each seed."""
-    random = np.random.default_rng(seed)
     x, y = np.meshgrid(np.linspace(0, 1, SIDE), np.linspace(0, 1, SIDE))
     points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     corner = (np.arange(SIDE - 1)[:, None] * SIDE + np.arange(SIDE - 1)).ravel()
-    faces = np.concatenate([corner[:, None] + (0, 1, SIDE), corner[:, None] + (1, SIDE + 1, SIDE)])
+    return _waves(points, np.concatenate([corner[:, None] + (0, 1, SIDE), corner[:, None] + (1, SIDE + 1, SIDE)]), seed)
+
+
+def _waves(points: Float64, faces: Int32, seed: int) -> MeshSequence:
+    random = np.random.default_rng(seed)
     t = np.arange(N_FRAMES)[:, None]
     positions = np.repeat(points[None], N_FRAMES, axis=0)
     for k in range(4):

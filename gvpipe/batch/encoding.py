@@ -8,7 +8,7 @@ import os
 import pickle
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,7 @@ class Done:
         seconds: that it took.
         is_new: whether the file was made now.
         notes: of the encode.
+        description: of the sequence, for data sets.
     """
 
     hash: str | None
@@ -54,6 +55,7 @@ class Done:
     seconds: float
     is_new: bool = True
     notes: tuple[str, ...] = ()
+    description: dict[str, Any] = field(default_factory=dict)
 
 
 def prepare(data: bytes) -> Work:
@@ -64,6 +66,9 @@ def prepare(data: bytes) -> Work:
 def encode_one(keywords: dict[str, Any], task: Task) -> Done:
     """Encode a sequence, unless it is done; whatever goes wrong is returned as ``error``, one line."""
     from gvpipe import api
+    from gvpipe.container.mp4 import read_file
+    from gvpipe.datasets.entries import describe
+    from gvpipe.datasets.statistics import describe_positions
 
     started = time.perf_counter()
     found = None
@@ -73,6 +78,8 @@ def encode_one(keywords: dict[str, Any], task: Task) -> Done:
             return Done(found, None, os.path.getsize(task.target), time.perf_counter() - started, False)
         Path(task.target).parent.mkdir(parents=True, exist_ok=True)
         report = api.encode(task.source, task.target, **keywords)
+        bitstream = read_file(task.target, unlimited=True)
+        description = {**describe(bitstream), **describe_positions(bitstream), **report.errors}
     except GvpipeError as exc:
         error = str(exc)
     except MemoryError:
@@ -80,7 +87,8 @@ def encode_one(keywords: dict[str, Any], task: Task) -> Done:
     except Exception as exc:  # the other sequences go on
         error = printable(f"unexpected {type(exc).__name__}: {' '.join(str(exc).split())}")
     else:
-        return Done(found, None, report.bytes, time.perf_counter() - started, notes=tuple(report.notes))
+        seconds = time.perf_counter() - started
+        return Done(found, None, report.bytes, seconds, notes=tuple(report.notes), description=description)
     return Done(found, error, 0, time.perf_counter() - started)
 
 

@@ -12,7 +12,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -36,6 +36,8 @@ class Entry:
         seconds: that the sequence took.
         gvpipe: version.
         settings: what was asked for.
+        description: what a sample of a data set says of the sequence (`gvpipe.datasets`), and errors that were measured.
+        decided: the codec that all sequences of the run have, of several candidates; empty: each chose, or there was one.
     """
 
     input: str
@@ -46,6 +48,8 @@ class Entry:
     seconds: float
     gvpipe: str
     settings: Mapping[str, Any]
+    description: Mapping[str, Any] = field(default_factory=dict)
+    decided: str = ""
 
 
 TYPES: dict[str, Any] = {
@@ -58,6 +62,8 @@ TYPES: dict[str, Any] = {
     "gvpipe": str,
     "settings": dict,
 }
+# keys that older manifests lack: type, and what stands for it
+ADDED: dict[str, tuple[Any, Any]] = {"description": (dict, {}), "decided": (str, "")}
 
 
 class Manifest:
@@ -142,7 +148,10 @@ def _parse(line: bytes, where: str) -> Entry:
         if name not in values or not isinstance(values[name], kind):
             found = quote(values[name]) if name in values else "missing"
             raise InputError(f"{where}: {name} is {found}, so this is no manifest of this gvpipe; {REMEDY}")
-    return Entry(**{name: values[name] for name in TYPES})
+    for name, (kind, default) in ADDED.items():
+        if not isinstance(values.setdefault(name, default), kind):
+            raise InputError(f"{where}: {name} is {quote(values[name])}, so this is no manifest of this gvpipe; {REMEDY}")
+    return Entry(**{name: values[name] for name in (*TYPES, *ADDED)})
 
 
 def _check_settings(found: Mapping[str, Any], wanted: Mapping[str, Any], path: Path) -> None:

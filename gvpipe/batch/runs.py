@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gvpipe.api import checked_keywords
+from gvpipe.batch.decision import FEW, Decision, decide, find_decided
 from gvpipe.batch.encoding import Done, Task, prepare
 from gvpipe.batch.inputs import Job, find_jobs
 from gvpipe.batch.manifest import Entry, Manifest, open_manifest
@@ -23,7 +24,7 @@ from gvpipe.foundation.atomic import output_error
 from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.progress import Progress
 from gvpipe.foundation.version import __version__
-from gvpipe.rate_control.purposes import own_settings
+from gvpipe.rate_control.purposes import describe, own_settings
 from gvpipe.tasks.choice import open_executor
 from gvpipe.tasks.executor import Executor, Outcome, WorkerDied
 
@@ -44,6 +45,7 @@ class BatchReport:
         seconds: of the run.
         manifest: its path.
         notes: what a user should know, and of how many sequences that are new.
+        decided: the codec that all sequences have, and why; empty where each chose, or one codec was asked for.
     """
 
     sequences: int
@@ -55,6 +57,7 @@ class BatchReport:
     seconds: float
     manifest: str
     notes: dict[str, int]
+    decided: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -69,6 +72,7 @@ def encode_all(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    each: bool = False,
     **options: Any,
 ) -> BatchReport:
     """Encode many sequences, a geometry video each; a sequence that cannot be encoded stops no other.
@@ -83,6 +87,9 @@ def encode_all(
         progress: called with the part of the sequences that has ended.
         workers: processes of this machine, one sequence each; None: one for each core.
         scheduler: address of a Dask scheduler whose workers encode them instead; they see the same files (extra ``cluster``).
+        each: of several candidates, such as those of codec ``auto``, each sequence chooses one, which takes all candidates'
+            encodes of each. By default three sequences choose for all, evenly spaced (`gvpipe.batch.decision`); where there are
+            no more, each chooses.
         options: other keywords of `gvpipe.encode`, and settings of the codec, the same for all.
 
     Raises:
@@ -94,7 +101,8 @@ def encode_all(
     given = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     place = Path(check_path(folder, "the folder of the outputs"))
     keywords = checked_keywords(codec, **options)
-    settings = settings_json(keywords)
+    is_each = each and not isinstance(keywords["codec"], Codec)
+    settings = {**settings_json(keywords), **({"each": True} if is_each else {})}
     if keywords.get("mesh") is not None:
         keywords["mesh"] = os.path.abspath(keywords["mesh"])  # workers may have another current folder
     found = find_jobs(given, place)
@@ -102,7 +110,10 @@ def encode_all(
     count = count_cores() if workers is None and scheduler is None else workers
     with open_manifest(place, settings) as manifest, open_executor(scheduler, count) as executor:
         assert executor is not None  # a count of workers or a scheduler is given
-        ended = _encode(executor, found.jobs, manifest, keywords, settings)
+        decision = None if is_each else _decide(executor, found.jobs, manifest, keywords)
+        if decision is not None:
+            keywords["codec"] = [decision.codec]  # a list: without a target, its error is that which candidates compete at
+        ended = _encode(executor, found.jobs, manifest, keywords, settings, decision)
         counts, notes, failed = Counter[str](), Counter[str](), []
         for number, (entry, done) in enumerate(ended, 1):
             notes.update(done.notes)
@@ -122,6 +133,7 @@ def encode_all(
         seconds=time.perf_counter() - started,
         manifest=str(manifest.path),
         notes=dict(notes),
+        decided="" if decision is None else decision.reason,
     )
 
 
@@ -144,7 +156,12 @@ def _make(folder: Path) -> None:
 
 
 def _encode(
-    executor: Executor, jobs: Sequence[Job], manifest: Manifest, keywords: Mapping[str, Any], settings: Mapping[str, Any]
+    executor: Executor,
+    jobs: Sequence[Job],
+    manifest: Manifest,
+    keywords: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    decision: Decision | None,
 ) -> Iterator[tuple[Entry, Done]]:
     """Let workers encode; yield what became of each sequence once the manifest has it."""
     place = manifest.path.parent
@@ -152,10 +169,33 @@ def _encode(
     for outcome in executor.run(prepare, pickle.dumps(dict(keywords)), tasks):
         job, done = jobs[outcome.index], _done(outcome)
         error = done.error and done.error.replace(tasks[outcome.index].source, job.source)
-        entry = Entry(job.source, done.hash, job.output, error, done.bytes, round(done.seconds, 3), __version__, settings)
+        entry = Entry(
+            input=job.source,
+            hash=done.hash,
+            output=job.output,
+            error=error,
+            bytes=done.bytes,
+            seconds=round(done.seconds, 3),
+            gvpipe=__version__,
+            settings=settings,
+            description=done.description,
+            decided="" if decision is None else describe(decision.codec),
+        )
         if done.is_new:
             manifest.add(entry)
         yield entry, done
+
+
+def _decide(executor: Executor, jobs: Sequence[Job], manifest: Manifest, keywords: Mapping[str, Any]) -> Decision | None:
+    """The codec for all sequences: that of the manifest, which an earlier run decided on, or a new one; None: each chooses."""
+    candidates = keywords["codec"]
+    if isinstance(candidates, Codec) or len(candidates) < 2 or len(jobs) <= FEW:
+        return None
+    for entry in manifest.entries.values():
+        codec = find_decided(candidates, entry.decided) if entry.error is None else None
+        if codec is not None:
+            return Decision(codec, f"codec {entry.decided} for all, as an earlier run decided")
+    return decide(executor, jobs, candidates, keywords)
 
 
 def _task(job: Job, place: Path, before: Entry | None) -> Task:

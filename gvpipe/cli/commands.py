@@ -289,12 +289,25 @@ def restream(source: str, target: str, layout: str | None, unlimited: bool, out:
 @click.argument("target", metavar="SHARD-%05d.tar")
 @click.option("--shard-size", metavar="BYTES", default="1GB", show_default=True, help="Most bytes of a shard: 500MB, 2GB.")
 @click.option("--shard-count", type=click.IntRange(1), metavar="N", help="Most sequences of a shard.")
+@click.option("--no-share", is_flag=True, help="Keep files as they are: store nothing once for files of one connectivity.")
+@click.option("--card", metavar="README.md", help="Write a data-set card: counts, errors, settings; your own text in it stays.")
 @unlimited_option
 @output_options
-def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unlimited: bool, out: Output) -> None:
+def pack(
+    folder: str,
+    target: str,
+    shard_size: str,
+    shard_count: int | None,
+    no_share: bool,
+    card: str | None,
+    unlimited: bool,
+    out: Output,
+) -> None:
     """Pack the geometry videos of a folder into shards for machine learning, in WebDataset's layout.
 
-    A shard is a tar file. Each NAME.mp4 becomes NAME.mp4 and NAME.json in it, the latter with what is in NAME.json beside it.
+    A shard is a tar file. Each NAME.mp4 becomes NAME.mp4 and NAME.json in it, the latter with what is in NAME.json beside it,
+    box, mean and scale of the positions, and errors that encode-all recorded.
+    A shard stores once what several bare files have in common, such as triangles, where that saves 1 % of the bytes.
     """
     from gvpipe import datasets
     from gvpipe.cli.choices import parse_bytes
@@ -303,15 +316,46 @@ def pack(folder: str, target: str, shard_size: str, shard_count: int | None, unl
     limit = parse_bytes("--shard-size", shard_size)
     with out.progress() as progress:
         packed = datasets.pack(
-            folder, target, shard_bytes=limit, shard_sequences=shard_count, progress=progress, unlimited=unlimited
+            folder,
+            target,
+            shard_bytes=limit,
+            shard_sequences=shard_count,
+            share=not no_share,
+            card=card,
+            progress=progress,
+            unlimited=unlimited,
         )
     out.json(packed.to_json())
     for reason in packed.left_out.values():
         out.note(f"left out: {reason}")
     counts = f"{count(packed.sequences, 'sequence')}, {count(len(packed.shards), 'shard')}"
-    out.text(f"{folder} -> {target} ({counts}, {_size(packed.bytes)})")
+    shared = f", {count(packed.shared_sections, 'shared section')}" if packed.shared_sections else ""
+    out.text(f"{folder} -> {target} ({counts}{shared}, {_size(packed.bytes)})")
     if packed.left_out:
         raise InputError(f"{len(packed.left_out)} files of {folder} are left out; {next(iter(packed.left_out.values()))}")
+
+
+@cli.command()
+@click.argument("source", metavar="SHARDS")
+@click.argument("folder", metavar="FOLDER")
+@click.argument("keys", metavar="[KEY...]", nargs=-1)
+@unlimited_option
+@output_options
+def unpack(source: str, folder: str, keys: tuple[str, ...], unlimited: bool, out: Output) -> None:
+    """Write samples of shards into FOLDER as whole files: KEY.mp4 and KEY.json.
+
+    SHARDS is a tar file, or a glob in quotes ('shard-*.tar'). Without a KEY, all samples are written.
+    """
+    from gvpipe import datasets
+    from gvpipe.foundation.notes import count
+
+    with out.progress() as progress:
+        try:
+            done = datasets.unpack(source, folder, keys, progress=progress, unlimited=unlimited)
+        except KeyError as exc:
+            raise InputError(f"{source}: {exc.args[0]}") from exc
+    out.json(done.to_json())
+    out.text(f"{source} -> {folder} ({count(done.sequences, 'sequence')}, {_size(done.bytes)})")
 
 
 @cli.command()

@@ -15,10 +15,11 @@ from gvpipe.cli.encode_options import encode_options, parse_encoding
 @click.argument("folder", metavar="FOLDER")
 @encode_options
 @click.option("--workers", type=int, metavar="N", help="Encode N sequences at a time. [default: as many as cores]")
+@click.option("--each", is_flag=True, help="With --codec auto: each sequence tries all codecs. [default: three, for all]")
 @click.option("--scheduler", metavar="ADDRESS", help="Encode them on a Dask cluster, such as tcp://host:8786.")
 @output_options
 def encode_all(
-    sources: tuple[str, ...], folder: str, workers: int | None, scheduler: str | None, out: Output, **options: Any
+    sources: tuple[str, ...], folder: str, workers: int | None, scheduler: str | None, each: bool, out: Output, **options: Any
 ) -> None:
     """Encode many mesh sequences, a geometry video each, into FOLDER.
 
@@ -32,7 +33,11 @@ def encode_all(
     asked = parse_encoding(options)
 
     with out.progress() as progress:
-        report = encode_all(sources, folder, asked.codec, progress, workers=workers, scheduler=scheduler, **asked.keywords)
+        report = encode_all(
+            sources, folder, asked.codec, progress, workers=workers, scheduler=scheduler, each=each, **asked.keywords
+        )
+    if report.decided:
+        out.note(report.decided)
     for note, number in report.notes.items():
         out.note(f"{note} ({number} of {count(report.sequences, 'sequence')})")
     if report.left_out:

@@ -9,6 +9,9 @@ the codec's pictures::
 
 The header is that of the plain layout, and ``sections`` has the length of each section by name, in order. A file of
 10 kB in the plain layout gives a tenth of its bytes to what is missing here.
+
+Version 2 is that of files in a shard: ``shared`` has the hash of each section that the shard holds in place of the file
+(`gvpipe.container.shared_sections`).
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ from gvpipe.container.bitstream import (
 from gvpipe.container.boxes import BOX
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject, unpack_json
+from gvpipe.container.shared_sections import FindSection, find_shared
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import TruncatedFile, corrupt
 
@@ -43,6 +47,7 @@ PREFIX = struct.Struct("<H")
 NO_TRACKS = BOX.pack(16, b"ftyp") + b"isom" + bytes(4) + BOX.pack(8, b"moov") + BOX.pack(8, b"mdat")
 MAX_LENGTH = 1 << 40  # of a section, bytes
 SECTIONS = "sections"
+SHARED, WITH_SHARED = "shared", 2  # key of the header, and the version of payloads that have it
 RAW = -15  # deflate without head and checksum, window of 32 KiB
 
 # What headers have in common, the most frequent last. Files depend on it: it never changes within a version.
@@ -58,28 +63,40 @@ DICTIONARY = (
 )
 
 
-def pack_bare(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
-    """Return the payload of everything but the video; ``extra`` is the container's own part of the header."""
+def pack_bare(bitstream: Bitstream, extra: Mapping[str, Any], shared: Mapping[str, str] | None = None) -> bytes:
+    """Return the payload of everything but the video.
+
+    Args:
+        bitstream: with all of its sections.
+        extra: the container's own part of the header.
+        shared: hashes of sections that are left out, by name.
+    """
+    shared = shared or {}
     values = header_values(bitstream, extra)
     if not extra:
         del values["container"]
     values[SECTIONS] = {name: len(data) for name, data in bitstream.sections.items()}
+    if shared:
+        values[SHARED] = dict(shared)
     deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
     text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
     header = pack_block(deflater.compress(text) + deflater.flush())
-    payload = b"".join([MAGIC, PREFIX.pack(VERSION), header, *bitstream.sections.values()])
+    own = [data for name, data in bitstream.sections.items() if name not in shared]
+    payload = b"".join([MAGIC, PREFIX.pack(WITH_SHARED if shared else VERSION), header, *own])
     return payload + CHECKSUM.pack(zlib.crc32(payload))
 
 
-def unpack_bare(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, JsonObject]:
+def unpack_bare(payload: bytes, budget: Budget = UNLIMITED, find: FindSection | None = None) -> tuple[Bitstream, JsonObject]:
     """Mirror of `pack_bare`: the bitstream without its video, and the header.
 
     Args:
         payload: the bytes, which begin with `MAGIC`.
-        budget: of the file, which the bitstream carries on to its readers.
+        budget: of the file, which the bitstream carries on to its readers; bytes of shared sections count as the file's.
+        find: returns shared sections; None: there are none.
 
     Raises:
-        NewerVersion: its version is above that of the container.
+        NewerVersion: its version is above those of this layout.
+        MissingSection: a shared section is not at hand.
         TruncatedFile: it is shorter than its shortest form.
         CorruptFile: anything else is not as written.
         OverBudget: the header inflates to more than the file may take.
@@ -88,7 +105,7 @@ def unpack_bare(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, 
     if len(payload) <= start + CHECKSUM.size:
         raise TruncatedFile("the payload ends inside its header; get the file again from its source")
     (version,) = PREFIX.unpack_from(payload, len(MAGIC))
-    check_version(version)
+    check_version(version, WITH_SHARED)
     content = payload[: -CHECKSUM.size]
     if CHECKSUM.unpack(payload[-CHECKSUM.size :]) != (zlib.crc32(content),):
         raise corrupt("the checksum of its payload does not match")
@@ -99,13 +116,25 @@ def unpack_bare(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, 
     inflater = zlib.decompressobj(RAW, zdict=DICTIONARY)
     header = unpack_json(cursor.block(), HEADER, MAX_HEADER, budget, inflater)
     bitstream = parse_header(header, budget)
-    return replace(bitstream, sections=_take_sections(cursor, header.object(SECTIONS)), is_bare=True), header
-
-
-def _take_sections(cursor: Cursor, lengths: JsonObject) -> dict[str, bytes]:
-    names = list(lengths.plain)
-    if len(names) > MAX_SECTIONS or not all(name.isascii() and NAME.fullmatch(name.encode()) for name in names):
-        raise lengths.corrupt("the names of its sections are not of a to z, 0 to 9 and dots")
-    sections = {name: cursor.take(lengths.integer(name, 0, MAX_LENGTH)) for name in names}
+    lengths = _lengths(header.object(SECTIONS))
+    shared = _find_shared(header, lengths, budget, find) if version == WITH_SHARED else {}
+    sections = {name: shared[name] if name in shared else cursor.take(length) for name, length in lengths.items()}
     cursor.end()
-    return sections
+    return replace(bitstream, sections=sections, is_bare=True, n_bytes=sum(map(len, shared.values()))), header
+
+
+def _lengths(found: JsonObject) -> dict[str, int]:
+    """Bytes of each section, in order."""
+    names = list(found.plain)
+    if len(names) > MAX_SECTIONS or not all(name.isascii() and NAME.fullmatch(name.encode()) for name in names):
+        raise found.corrupt("the names of its sections are not of a to z, 0 to 9 and dots")
+    return {name: found.integer(name, 0, MAX_LENGTH) for name in names}
+
+
+def _find_shared(header: JsonObject, lengths: dict[str, int], budget: Budget, find: FindSection | None) -> dict[str, bytes]:
+    """The shared sections by name; the file may take what one that holds them may take."""
+    hashes = header.object(SHARED)
+    found = find_shared({name: hashes.text(name) for name in hashes.plain}, lengths, find)
+    if budget.n_bytes is not None:
+        budget.grow(budget.n_bytes + sum(map(len, {hashes.text(name): data for name, data in found.items()}.values())))
+    return found

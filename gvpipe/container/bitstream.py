@@ -71,7 +71,7 @@ class Bitstream:
             poster (`gvpipe.rendering.poster`) instead.
         fragments: in place of ``video``, of a file in the stream layout (`gvpipe.container.stream_layout`).
         is_bare: whether its file has the bare layout (`gvpipe.container.bare`), which has a video for pictures alone.
-        n_bytes: of the file that it was read from, 0 if it was not.
+        n_bytes: of the file that it was read from, and of the shared sections that it refers to; 0 if it was not read.
         is_unfinished: it has the first frames of a file that is still written, or was left so, and no video
             (`gvpipe.container.live_layout`).
         budget: what its readers may take (`gvpipe.foundation.budget`).
@@ -212,10 +212,10 @@ def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstrea
     return replace(bitstream, sections=sections), container
 
 
-def check_version(version: int) -> None:
-    """Raise `NewerVersion` for a container version above `VERSION`."""
-    if version > VERSION:
-        raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {VERSION}; upgrade gvpipe")
+def check_version(version: int, latest: int = VERSION) -> None:
+    """Raise `NewerVersion` for a container version above the latest of its layout."""
+    if version > latest:
+        raise NewerVersion(f"the file has container version {version}, this gvpipe reads up to {latest}; upgrade gvpipe")
 
 
 def check_payload_version(payload: bytes) -> None:

@@ -17,7 +17,7 @@ import hashlib
 import io
 import os
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -39,6 +39,7 @@ from gvpipe.container.json_object import JsonObject
 from gvpipe.container.live_layout import read_live
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
+from gvpipe.container.shared_sections import FindSection
 from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_remote, is_url
 from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
@@ -92,9 +93,9 @@ def write_file(
     return size
 
 
-def file_bytes(bitstream: Bitstream, parts: SegmentParts | None = None) -> bytes:
-    """The file that `write_file` would write."""
-    return b"".join(_pack(bitstream, parts))
+def file_bytes(bitstream: Bitstream, parts: SegmentParts | None = None, shared: Mapping[str, str] | None = None) -> bytes:
+    """The file that `write_file` would write; in the bare layout, ``shared`` has hashes of sections that are left out."""
+    return b"".join(_pack(bitstream, parts, shared))
 
 
 def file_size(bitstream: Bitstream, parts: SegmentParts | None = None) -> int:
@@ -102,27 +103,29 @@ def file_size(bitstream: Bitstream, parts: SegmentParts | None = None) -> int:
     return sum(map(len, _pack(bitstream, parts)))
 
 
-def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstream:
+def read_file(path: str | os.PathLike[str], unlimited: bool = False, find: FindSection | None = None) -> Bitstream:
     """Read and check the bitstream of an MP4 file; in the stream layout, its sections and pictures are read later.
 
     Args:
         path: of the file, or its address (``https://...``, with fsspec also ``s3://...`` and others).
         unlimited: let it take whatever memory and work it asks for; by default its size limits both
             (`gvpipe.foundation.budget`).
+        find: returns the sections that the file shares with others of its shard; None: it has all of its own.
 
     Raises:
         InputError: there is no such file, or it cannot be read.
-        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, OverBudget: see `gvpipe.foundation.errors`.
+        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, MissingSection, OverBudget: see
+            `gvpipe.foundation.errors`.
     """
     if is_remote(path):
-        return _read_address(str(path), unlimited)
+        return _read_address(str(path), unlimited, find)
     check_source(path)
     path = Path(path)
     try:
         source = FileSource(path)
         with open(path, "rb") as file:
             budget, index = Budget(None if unlimited else source.size), find_index(source)
-            return _read(file, source.size, budget) if index is None else _read_parts(source, index, budget)
+            return _read(file, source.size, budget, find) if index is None else _read_parts(source, index, budget)
     except FormatError as exc:
         raise exc.within(str(path)) from exc
     except IsADirectoryError as exc:
@@ -133,12 +136,12 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False) -> Bitstrea
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check its permissions") from exc
 
 
-def read_bytes(data: bytes, name: str, unlimited: bool = False) -> Bitstream:
+def read_bytes(data: bytes, name: str, unlimited: bool = False, find: FindSection | None = None) -> Bitstream:
     """As `read_file`, of a file in memory; messages call it ``name``."""
     try:
         source = BytesSource(data)
         budget, index = Budget(None if unlimited else source.size), find_index(source)
-        return _read(io.BytesIO(data), source.size, budget) if index is None else _read_parts(source, index, budget)
+        return _read(io.BytesIO(data), source.size, budget, find) if index is None else _read_parts(source, index, budget)
     except FormatError as exc:
         raise exc.within(name) from exc
 
@@ -172,11 +175,11 @@ def load(bitstream: Bitstream) -> Bitstream:
     return loaded
 
 
-def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
+def _pack(bitstream: Bitstream, parts: SegmentParts | None, shared: Mapping[str, str] | None = None) -> Iterable[bytes]:
     """A file in parts: in the plain layout the video with its tag, in blocks, the head of the box, the payload."""
     bitstream = load(bitstream)
     if bitstream.is_bare and parts is None:
-        return _pack_bare(bitstream)
+        return _pack_bare(bitstream, shared)
     identity = _content_id(bitstream)
     track = inspect(bitstream.video)
     extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration}
@@ -187,18 +190,18 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None) -> Iterable[bytes]:
     return chain(remux(bitstream.video, f"{VERSION} {identity}"), [uuid_head(BOX_UUID, len(payload)), payload])
 
 
-def _pack_bare(bitstream: Bitstream) -> Iterable[bytes]:
+def _pack_bare(bitstream: Bitstream, shared: Mapping[str, str] | None) -> Iterable[bytes]:
     """A file of the bare layout in parts."""
     extra: dict[str, Any] = {}
     video: Iterable[bytes] = [bare.NO_TRACKS]
     if bitstream.video:
         track, video = inspect(bitstream.video), remux(bitstream.video)
         extra = {"video_crc32": track.checksum, "track_crc32": track.configuration}
-    payload = bare.pack_bare(bitstream, extra)
+    payload = bare.pack_bare(bitstream, extra, shared)
     return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
 
-def _read_address(url: str, unlimited: bool) -> Bitstream:
+def _read_address(url: str, unlimited: bool, find: FindSection | None) -> Bitstream:
     """As `read_file`; the budget is that of the bytes that have come so far, since a server may claim any size."""
     budget = Budget(None if unlimited else 0)
     try:
@@ -207,7 +210,7 @@ def _read_address(url: str, unlimited: bool) -> Bitstream:
         if index is not None:
             return _read_parts(source, index, budget)
         data = source.read_all()
-        return _read(io.BytesIO(data), len(data), budget)
+        return _read(io.BytesIO(data), len(data), budget, find)
     except NotGeometryVideo as exc:
         raise NotGeometryVideo(exc.what, DOWNLOAD_FIRST, url) from exc
     except FormatError as exc:
@@ -230,7 +233,7 @@ def _read_parts(source: Source, index: Box, budget: Budget) -> Bitstream:
     return (read_live if index.uuid == ROOM_UUID.bytes else read_stream)(source, index, budget)
 
 
-def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
+def _read(file: IO[bytes], size: int, budget: Budget, find: FindSection | None) -> Bitstream:
     layout = _find_payload(file, size)
     if layout.payload is None:
         if _is_tagged(file, layout):
@@ -241,7 +244,8 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
     file.seek(layout.payload[0])
     payload = file.read(layout.payload[1] - layout.payload[0])
     if payload.startswith(bare.MAGIC):
-        return _read_bare(video, layout, payload, budget, size)
+        bitstream, header = bare.unpack_bare(payload, budget, find)
+        return _with_pictures(replace(bitstream, n_bytes=size + bitstream.n_bytes), header, video, layout)
     check_payload_version(payload)
     check_tables(video[slice(*layout.moov)], layout.video_end)
     track = inspect(video, budget)
@@ -257,16 +261,14 @@ def _read(file: IO[bytes], size: int, budget: Budget) -> Bitstream:
     return replace(bitstream, video=video, n_bytes=size)
 
 
-def _read_bare(video: bytes, layout: _Layout, payload: bytes, budget: Budget, size: int) -> Bitstream:
-    """A file of the bare layout; what has no pictures is not given to FFmpeg."""
-    bitstream, header = bare.unpack_bare(payload, budget)
-    bitstream = replace(bitstream, n_bytes=size)
+def _with_pictures(bitstream: Bitstream, header: JsonObject, video: bytes, layout: _Layout) -> Bitstream:
+    """A file of the bare layout with its pictures; what has none is not given to FFmpeg."""
     if "container" not in header:
         if video != bare.NO_TRACKS:
             raise corrupt("it has a video that its header does not describe")
         return bitstream
     check_tables(video[slice(*layout.moov)], layout.video_end)
-    _check_track(header.object("container"), inspect(video, budget))
+    _check_track(header.object("container"), inspect(video, bitstream.budget))
     return replace(bitstream, video=video)
 
 

@@ -13,19 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.coding.codec import ClosableReader, FrameReader, LevelReader
-from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import read_bytes
+from gvpipe.container.mp4 import file_bytes, read_bytes
 from gvpipe.container.shared_parts import SharedParts
-from gvpipe.container.sources import FileSource
+from gvpipe.datasets.decoding import ALL, check_view, decode_sample
 from gvpipe.datasets.shard_index import Place, Sample, index_shard
+from gvpipe.datasets.shared import SharedSections, open_source
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.arrays import Float32, Int32
 from gvpipe.foundation.errors import FormatError, InputError, corrupt, in_file, quote
 from gvpipe.playback.player import Player
 
-ALL = slice(None)
 MAX_JSON = 1 << 24  # bytes of a sample's description
 MAX_VIDEO = 1 << 32  # bytes of a sample's video
 
@@ -48,10 +46,13 @@ class Dataset:
     def __init__(self, shards: Sequence[str], *, unlimited: bool = False) -> None:
         self.shards = list(shards)
         self._unlimited = unlimited
-        self._sources = [_source(path) for path in self.shards]
+        self._sources = [open_source(path) for path in self.shards]
         self._places: list[tuple[int, Sample]] = []
+        self._sections: list[SharedSections] = []  # of each shard
         for k, path in enumerate(self.shards):
-            self._places += [(k, sample) for sample in index_shard(path)]
+            index = index_shard(path)
+            self._places += [(k, sample) for sample in index.samples]
+            self._sections.append(SharedSections([(self._sources[k], index.shared)]))
         self._numbers: dict[str, int] = {}
         for number, (k, sample) in enumerate(self._places):
             first = self._numbers.setdefault(sample.key, number)
@@ -95,23 +96,29 @@ class Dataset:
             TypeError: ``frames`` is no slice, or ``lod`` no integer.
             FormatError: the sample is cut or damaged.
         """
-        _check_view(frames, lod)
+        check_view(frames, lod)
         return self._decode(self.number(sample), frames, lod, False)[0]
 
     def faces(self, sample: int | str, lod: int = 0) -> Int32:
         """Return the triangles of a sequence, ``(T, 3) int32``, at a level of detail as `read` takes it."""
-        _check_view(ALL, lod)
+        check_view(ALL, lod)
         return self._decode(self.number(sample), slice(0, 0), lod, True)[1]
+
+    def description_text(self, sample: int | str) -> bytes:
+        """Return the JSON of a sample as its shard has it; empty if it has none."""
+        number = self.number(sample)
+        place = self._places[number][1].description
+        with in_file(self._name(number)):
+            return self._bytes(number, place, MAX_JSON) if place.length else b""
 
     def description(self, sample: int | str) -> dict[str, Any]:
         """Return the JSON object of a sample; empty if it has none."""
-        number = self.number(sample)
-        with in_file(self._name(number)):
-            place = self._places[number][1].description
-            if not place.length:
+        text = self.description_text(sample)
+        with in_file(self._name(self.number(sample))):
+            if not text:
                 return {}
             try:
-                found = json.loads(self._bytes(number, place, MAX_JSON))
+                found = json.loads(text)
             except (ValueError, RecursionError) as exc:
                 raise corrupt(f"its description is not JSON ({exc})") from exc
             if not isinstance(found, dict):
@@ -121,13 +128,27 @@ class Dataset:
     def open(self, sample: int | str) -> Player:
         """Open a sequence with all that it has, as `gvpipe.open` does."""
         number = self.number(sample)
-        return Player(self._name(number), unlimited=self._unlimited, data=self._video(number))
+        data, shared = self._video(number), self._sections[self._places[number][0]]
+        return Player(self._name(number), unlimited=self._unlimited, data=data, shared=shared)
+
+    def whole_file(self, sample: int | str) -> bytes:
+        """Return a sample's geometry video as it was packed, with the sections that it shares with others of its shard."""
+        number = self.number(sample)
+        data, bitstream = self._video(number), self.bitstream(number)
+        return data if bitstream.n_bytes == len(data) else file_bytes(bitstream)
 
     def bitstream(self, sample: int | str) -> Bitstream:
         """Return the coded sequence, whose checksums hold."""
         number = self.number(sample)
-        bitstream = read_bytes(self._video(number), self._name(number), self._unlimited)
+        shared = self._sections[self._places[number][0]]
+        bitstream = read_bytes(self._video(number), self._name(number), self._unlimited, shared)
         return replace(bitstream, shared=self._shared)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all geometry videos in the shards, and of the sections that they share."""
+        videos = sum(sample.video.length for _, sample in self._places)
+        return videos + sum(sections.n_bytes for sections in self._sections)
 
     def samples(self, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None) -> Samples:
         """The same sequences, of which samples have some frames or a coarser mesh, or are transformed."""
@@ -162,17 +183,7 @@ class Dataset:
 
     def _decode(self, number: int, frames: slice, lod: int, with_faces: bool) -> tuple[Float32, Int32, Bitstream]:
         bitstream = self.bitstream(number)
-        with in_file(self._name(number)):
-            reader = open_reader(bitstream)
-            try:
-                lod = _clip_level(reader, lod)
-                positions = _read(reader, bitstream.n_frames, frames, lod)
-                faces = _faces(reader, lod) if with_faces else np.zeros((0, 3), np.int32)
-            finally:
-                if isinstance(reader, ClosableReader):
-                    reader.close()
-        if with_faces and not lod and "asset" in bitstream.sections:  # its parts have an order of their own
-            faces = self.open(number).faces
+        positions, faces = decode_sample(bitstream, self._name(number), frames, lod, with_faces)
         return positions, faces, bitstream
 
     def _video(self, number: int) -> bytes:
@@ -207,7 +218,7 @@ class Samples:
     def __init__(
         self, dataset: Dataset, frames: slice = ALL, lod: int = 0, transform: Callable[[dict[str, Any]], Any] | None = None
     ) -> None:
-        _check_view(frames, lod)
+        check_view(frames, lod)
         if transform is not None and not callable(transform):
             raise TypeError(f"transform is {show(transform)}; a function of a sample is needed")
         self._dataset, self._frames, self._lod, self._transform = dataset, frames, lod, transform
@@ -224,37 +235,3 @@ class Samples:
 
     def __iter__(self) -> Iterator[Any]:
         return (self[k] for k in range(len(self)))
-
-
-def _source(path: str) -> FileSource:
-    try:
-        return FileSource(path)
-    except OSError as exc:
-        raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path and its permissions") from exc
-
-
-def _check_view(frames: object, lod: object) -> None:
-    if not isinstance(frames, slice):
-        raise TypeError(f"frames are {show(frames)}; a slice is needed, such as slice(0, 8)")
-    if isinstance(lod, bool) or not isinstance(lod, int):
-        raise TypeError(f"lod is {show(lod)}; an integer is needed")
-    if lod < 0:
-        raise InputError(f"no level of detail {lod}; 0 is the mesh, higher ones are coarser")
-
-
-def _clip_level(reader: FrameReader, lod: int) -> int:
-    return min(lod, len(reader.levels) - 1) if lod and isinstance(reader, LevelReader) else 0
-
-
-def _read(reader: FrameReader, n_frames: int, frames: slice, lod: int) -> Float32:
-    """The frames of a slice, which are read as one span."""
-    wanted = range(*frames.indices(n_frames))
-    start, stop = (min(wanted[0], wanted[-1]), max(wanted[0], wanted[-1]) + 1) if wanted else (0, 0)
-    positions = reader.read(start, stop, lod=lod) if lod and isinstance(reader, LevelReader) else reader.read(start, stop)
-    return positions if wanted.step == 1 or not wanted else positions[[k - start for k in wanted]]
-
-
-def _faces(reader: FrameReader, lod: int) -> Int32:
-    """Triangles that are the caller's own: readers may share theirs."""
-    faces = reader.level_faces(lod) if lod and isinstance(reader, LevelReader) else reader.faces
-    return faces.copy()

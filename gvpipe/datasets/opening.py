@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 from gvpipe.container.sources import check_source
 from gvpipe.datasets.dataset import Dataset
+from gvpipe.datasets.shard_index import index_shard
+from gvpipe.datasets.shared import SharedSections, open_source
 from gvpipe.foundation.arguments import StrPath, check_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.frames.numbering import natural_key
@@ -26,6 +28,23 @@ def open(shards: StrPath | Sequence[StrPath], *, unlimited: bool = False) -> Dat
         TypeError: it is no path.
     """
     return Dataset(find_shards(shards), unlimited=unlimited)
+
+
+def shared_sections(shards: StrPath | Sequence[StrPath]) -> SharedSections:
+    """Return what files of shards share, for samples that another program takes out of them.
+
+    Examples:
+        ``gvpipe.Player(key, data=sample["mp4"], shared=gvpipe.datasets.shared_sections("shard-*.tar"))``
+
+    Args:
+        shards: as for `open`.
+
+    Raises:
+        InputError: there is no such shard.
+        FormatError: a shard is cut or damaged.
+        TypeError: it is no path.
+    """
+    return SharedSections([(open_source(path), index_shard(path).shared) for path in find_shards(shards)])
 
 
 def find_shards(shards: StrPath | Sequence[StrPath]) -> list[str]:

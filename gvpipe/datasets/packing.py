@@ -1,7 +1,8 @@
 """Geometry videos of a folder into shards: tar files in WebDataset's layout, the same bytes on every machine.
 
-A sample is two members, ``KEY.mp4`` and ``KEY.json``. The files come in natural order of their paths. Owners, permissions and
-times are left out, so that equal files make equal shards. A shard takes its name once it is whole.
+A sample is two members, ``KEY.mp4`` and ``KEY.json``. The files come in natural order of their paths. What several files of a
+shard have in common is a member of its own, ``__shared-HASH__``, before the first of them. Owners, permissions and times are
+left out, so that equal files make equal shards. A shard takes its name once it is whole.
 """
 
 from __future__ import annotations
@@ -17,22 +18,20 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import read_bytes
 from gvpipe.container.sources import check_target
-from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, key_of
+from gvpipe.datasets.card import Contents, check_card, write_card
+from gvpipe.datasets.entries import look_at
+from gvpipe.datasets.recorded import read_recorded
+from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, key_of, shared_name
+from gvpipe.datasets.shard_plan import Shard, plan_shards
 from gvpipe.foundation.arguments import StrPath, check_path
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import FormatError, InputError, OutputError
-from gvpipe.foundation.isolation.plain_files import open_plain
 from gvpipe.foundation.progress import Progress
 from gvpipe.io.frames.numbering import natural_key
 
 SHARD_BYTES = 1_000_000_000
-BLOCK = tarfile.BLOCKSIZE
-END = 2 * BLOCK  # bytes that mark the end of a shard, before it is filled up
 NUMBER = re.compile(r"%0?\d{0,2}d")
-MAX_DESCRIPTION = 1 << 20  # bytes of a file's own JSON
 
 
 @dataclass(frozen=True)
@@ -44,12 +43,14 @@ class Packed:
         sequences: how many samples they have.
         bytes: of all shards.
         left_out: by path, why a file is in none of them, one line each.
+        shared_sections: how many sections are stored once for several samples, all shards together.
     """
 
     shards: list[str] = field(default_factory=list)
     sequences: int = 0
     bytes: int = 0
     left_out: dict[str, str] = field(default_factory=dict)
+    shared_sections: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """The same as JSON values."""
@@ -62,6 +63,8 @@ def pack(
     *,
     shard_bytes: int = SHARD_BYTES,
     shard_sequences: int | None = None,
+    share: bool = True,
+    card: StrPath | None = None,
     progress: Progress | None = None,
     unlimited: bool = False,
 ) -> Packed:
@@ -73,81 +76,80 @@ def pack(
         target: of the shards, ``shard-%05d.tar``, numbered from 0; without a number, all goes into one.
         shard_bytes: most bytes of a shard, unless one sample alone takes more.
         shard_sequences: most samples of a shard; None: as many as the bytes allow.
-        progress: called with ``"pack"`` and the part that is done.
+        share: whether sections that several files have in common, such as those of one connectivity, are stored once a
+            shard, where that saves 1 % of the bytes. Only files of the bare layout share.
+        card: of a page in Markdown that sums up the data set, for Hugging Face; None: none. In a page that is there, what
+            lies between ``<!-- gvpipe: begin -->`` and ``<!-- gvpipe: end -->`` is written anew, the rest stays.
+        progress: called with ``"check"``, then with ``"pack"``, and the part that is done.
         unlimited: as for `gvpipe.open`.
 
     Raises:
-        InputError: there are no such files, two of them have one key, or a limit cannot be.
+        InputError: there are no such files, two of them have one key, a limit cannot be, or the card has no such lines.
         OutputError: a shard cannot be written, or is there already. Shards that are whole stay.
     """
     pattern = os.fspath(check_path(target, "the shards"))
-    for name, value in (("shard_bytes", shard_bytes), ("shard_sequences", shard_sequences)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
-            raise InputError(f"{name} is {value!r}; a whole number of 1 or more is needed")
+    card_before = "" if card is None else check_card(check_path(card, "the card"))
+    _check_limits(shard_bytes=shard_bytes, shard_sequences=shard_sequences)
     left_out: dict[str, str] = {}
-    files = _find(Path(check_path(folder, "the folder of geometry videos")), left_out)
+    place = Path(check_path(folder, "the folder of geometry videos"))
+    files = _find(place, left_out)
     is_numbered = _check_pattern(pattern)
     if not is_numbered:
         shard_bytes, shard_sequences = len(files) << 40, None
-    samples = _Ahead(_samples(files, left_out, progress, unlimited))
-    shards: list[str] = []
-    while samples.has_next():
-        shards.append(pattern % len(shards) if is_numbered else pattern)
-        _write_shard(shards[-1], samples, shard_bytes, shard_sequences)
-    return Packed(shards, samples.n_taken, sum(map(os.path.getsize, shards)), left_out)
+    recorded = read_recorded(place)
+    entries = list(look_at(files, recorded, left_out, progress, unlimited))
+    plan = plan_shards(entries, shard_bytes, shard_sequences, share)
+    names = [pattern % k if is_numbered else pattern for k in range(len(plan))]
+    members = _Members(len(entries), left_out, progress, unlimited)
+    for name, shard in zip(names, plan, strict=True):
+        _write_shard(name, members.of(shard))
+    if card is not None:
+        packed = [json.loads(entry.description) for entry in entries if str(entry.path) not in left_out]
+        together = NUMBER.sub("*", os.path.basename(pattern))
+        write_card(card, card_before, Contents(names, together, packed, recorded.settings))
+    sizes = sum(map(os.path.getsize, names))
+    return Packed(names, members.n_packed, sizes, left_out, len(members.shared))
 
 
-def describe(bitstream: Bitstream) -> dict[str, Any]:
-    """What gvpipe writes of a sequence into its sample's JSON."""
-    return {
-        "codec": bitstream.codec,
-        "vertices": bitstream.n_vertices,
-        "triangles": bitstream.n_triangles,
-        "frames": bitstream.n_frames,
-        "fps": bitstream.fps,
-        "bytes": bitstream.n_bytes,
-    }
+class _Members:
+    """The members of one shard after the other, by name.
+
+    Args:
+        n_entries: of all shards.
+        left_out: gets why a file is in no shard.
+        progress, unlimited: as for `pack`.
+
+    ``n_packed`` counts files, ``shared`` has the hashes of sections that were stored.
+    """
+
+    def __init__(self, n_entries: int, left_out: dict[str, str], progress: Progress | None, unlimited: bool) -> None:
+        self._n_entries, self._left_out, self._progress, self._unlimited = n_entries, left_out, progress, unlimited
+        self.n_packed, self.shared = 0, set[str]()
+
+    def of(self, shard: Shard) -> Iterator[tuple[str, bytes]]:
+        """Yield name and content of each member."""
+        stored = set[str]()
+        for entry in shard.entries:
+            if self._progress:
+                self._progress("pack", self.n_packed / self._n_entries)
+            try:
+                data, sections = entry.read(self._unlimited, shard.stored)
+            except (FormatError, InputError) as exc:
+                self._left_out[str(entry.path)] = str(exc)
+                continue
+            for digest in [digest for digest in sections if digest not in stored]:
+                yield shared_name(digest), sections[digest]
+            stored |= sections.keys()
+            yield f"{entry.key}.{VIDEO}", data
+            yield f"{entry.key}.{DESCRIPTION}", entry.description
+            self.n_packed += 1
+        self.shared |= stored
 
 
-@dataclass(frozen=True)
-class _Sample:
-    """A sample's members by name."""
-
-    members: dict[str, bytes]
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes in a shard: of headers, and of contents that fill blocks."""
-        return sum(BLOCK + len(data) + -len(data) % BLOCK for data in self.members.values())
-
-
-class _Ahead:
-    """Samples one after the other; the next can be looked at."""
-
-    def __init__(self, samples: Iterator[_Sample]) -> None:
-        self._samples, self._next, self.n_taken = samples, next(samples, None), 0
-
-    def has_next(self, room: float = float("inf")) -> bool:
-        """Whether there is a sample of at most so many bytes."""
-        return self._next is not None and self._next.n_bytes <= room
-
-    def take(self) -> _Sample:
-        """Return the next; there must be one."""
-        sample, self._next = self._next, next(self._samples, None)
-        assert sample is not None
-        self.n_taken += 1
-        return sample
-
-
-def _write_shard(path: str, samples: _Ahead, most_bytes: int, most: int | None) -> None:
-    """Write samples until a limit, the first in any case."""
+def _write_shard(path: str, members: Iterator[tuple[str, bytes]]) -> None:
     with unnamed_path(path) as temporary, tarfile.open(temporary, "w", format=tarfile.USTAR_FORMAT) as archive:
-        n, n_bytes = 0, END
-        while samples.has_next(most_bytes - n_bytes if n else float("inf")) and (most is None or n < most):
-            sample = samples.take()
-            n, n_bytes = n + 1, n_bytes + sample.n_bytes
-            for name, data in sample.members.items():
-                archive.addfile(_member(name, len(data)), io.BytesIO(data))
+        for name, data in members:
+            archive.addfile(_member(name, len(data)), io.BytesIO(data))
 
 
 def _member(name: str, size: int) -> tarfile.TarInfo:
@@ -155,52 +157,6 @@ def _member(name: str, size: int) -> tarfile.TarInfo:
     member = tarfile.TarInfo(name)
     member.size, member.mode = size, 0o644
     return member
-
-
-def _samples(files: dict[str, Path], left_out: dict[str, str], progress: Progress | None, unlimited: bool) -> Iterator[_Sample]:
-    for k, (key, path) in enumerate(files.items()):
-        if progress:
-            progress("pack", k / len(files))
-        try:
-            with open_plain(path, follows=False) as file:
-                data = file.read()
-            description = {**_beside(path), **describe(read_bytes(data, str(path), unlimited))}
-            text = _as_json(description, path)
-            _member(f"{key}.{DESCRIPTION}", 0).tobuf(tarfile.USTAR_FORMAT)
-        except (FormatError, InputError) as exc:
-            left_out[str(path)] = str(exc)
-        except OSError as exc:
-            left_out[str(path)] = f"{path} cannot be read: {exc.strerror or exc}; check its permissions"
-        except ValueError:
-            left_out[str(path)] = f"{path}: its path is too long for a tar file; choose a shorter name"
-        else:
-            yield _Sample({f"{key}.{VIDEO}": data, f"{key}.{DESCRIPTION}": text})
-
-
-def _beside(path: Path) -> dict[str, Any]:
-    """The JSON object beside a file; empty if there is none."""
-    beside = path.with_suffix(f".{DESCRIPTION}")
-    if not os.path.lexists(beside):
-        return {}
-    with open_plain(beside, follows=False) as file:
-        data = file.read(MAX_DESCRIPTION + 1)
-    if len(data) > MAX_DESCRIPTION:
-        raise InputError(f"{beside} has more than {MAX_DESCRIPTION} bytes; shorten it")
-    try:
-        found = json.loads(data)
-    except (ValueError, RecursionError) as exc:
-        raise InputError(f"{beside} is not JSON ({exc}); mend or remove it") from exc
-    if not isinstance(found, dict):
-        raise InputError(f"{beside} is no JSON object; give one, with names")
-    return found
-
-
-def _as_json(description: dict[str, Any], path: Path) -> bytes:
-    try:
-        return json.dumps(description, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-    except ValueError as exc:  # half a character, say; or NaN, which is no JSON
-        beside = path.with_suffix(f".{DESCRIPTION}")
-        raise InputError(f"{beside} holds what no JSON file in UTF-8 can hold ({exc}); mend or remove it") from exc
 
 
 def _find(folder: Path, left_out: dict[str, str]) -> dict[str, Path]:
@@ -226,6 +182,12 @@ def _find(folder: Path, left_out: dict[str, str]) -> dict[str, Path]:
             )
         files[key] = relative[path]
     return files
+
+
+def _check_limits(**limits: object) -> None:
+    for name, value in limits.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+            raise InputError(f"{name} is {value!r}; a whole number of 1 or more is needed")
 
 
 def _check_pattern(pattern: str) -> bool:

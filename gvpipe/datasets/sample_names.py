@@ -1,10 +1,15 @@
-"""Names of members: a sample's key, then what it is of the sample. As in WebDataset, the key ends at the name's first dot."""
+"""Names of members: a sample's key, then what it is of the sample. As in WebDataset, the key ends at the name's first dot.
+
+A shared section is ``__shared-HASH__``. WebDataset passes over names that begin and end so, and over names without a dot.
+"""
 
 from __future__ import annotations
 
+import re
 from pathlib import PurePosixPath
 
 VIDEO, DESCRIPTION = "mp4", "json"
+SHARED = re.compile(r"__shared-([0-9a-f]{32})__")
 
 
 def key_of(path: PurePosixPath) -> str:
@@ -32,3 +37,19 @@ def split_name(name: str) -> tuple[str, str]:
 def is_plain(name: str) -> bool:
     """Whether a member's name leads nowhere but below the folder that an archive is unpacked to."""
     return bool(name) and not name.startswith("/") and "\\" not in name and ".." not in name.split("/") and name.isprintable()
+
+
+def shared_name(digest: str) -> str:
+    """The member that holds the shared section of a hash."""
+    return f"__shared-{digest}__"
+
+
+def shared_hash(name: str) -> str | None:
+    """Mirror of `shared_name`; None for other members.
+
+    Examples:
+        >>> shared_hash("__shared-e3b0c44298fc1c149afbf4c8996fb924__"), shared_hash("a.mp4")
+        ('e3b0c44298fc1c149afbf4c8996fb924', None)
+    """
+    found = SHARED.fullmatch(name)
+    return found[1] if found else None

@@ -11,7 +11,7 @@ import tarfile
 from collections.abc import Iterator
 from typing import Any, BinaryIO, NamedTuple, cast
 
-from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, split_name
+from gvpipe.datasets.sample_names import DESCRIPTION, VIDEO, is_plain, shared_hash, split_name
 from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, TruncatedFile, corrupt, quote
 
 BLOCK = tarfile.BLOCKSIZE
@@ -36,8 +36,15 @@ class Sample(NamedTuple):
     description: Place
 
 
-def index_shard(path: str) -> list[Sample]:
-    """Return the samples of a shard that have a video, in the order of their videos.
+class Index(NamedTuple):
+    """Samples that have a video, in the order of their videos, and where shared sections are, by hash."""
+
+    samples: list[Sample]
+    shared: dict[str, Place]
+
+
+def index_shard(path: str) -> Index:
+    """Return what a shard has, and where.
 
     Raises:
         InputError: there is no such file, or it cannot be read.
@@ -46,20 +53,23 @@ def index_shard(path: str) -> list[Sample]:
     """
     videos: dict[str, Place] = {}
     descriptions: dict[str, Place] = {}
+    shared: dict[str, Place] = {}
     kinds = {VIDEO: videos, DESCRIPTION: descriptions}
     try:
         for name, place in _members(path):
-            key, kind = split_name(name)
-            if kind not in kinds:
+            digest = shared_hash(name)
+            key, kind = split_name(name) if digest is None else (digest, "")
+            places = kinds.get(kind) if digest is None else shared
+            if places is None:
                 continue
-            if key in kinds[kind]:
+            if key in places:
                 raise corrupt(f"member {quote(name)} at byte {place.offset} occurs twice")
-            kinds[kind][key] = place
+            places[key] = place
     except FormatError as exc:
         raise exc.within(str(path)) from exc
     except OSError as exc:
         raise InputError(f"{path} cannot be read: {exc.strerror or exc}; check the path and its permissions") from exc
-    return [Sample(key, place, descriptions.get(key, Place(0, 0))) for key, place in videos.items()]
+    return Index([Sample(key, place, descriptions.get(key, Place(0, 0))) for key, place in videos.items()], shared)
 
 
 def _members(path: str) -> Iterator[tuple[str, Place]]:

@@ -26,7 +26,7 @@ class Summary:
         shards, sequences: how many.
         vertices, frames: least and most of a sequence, and all.
         triangles: of all sequences.
-        bytes: of the shards; ``video_bytes`` of the geometry videos in them.
+        bytes: of the shards; ``video_bytes`` of the geometry videos in them and of what these share.
         ratio: bytes of all positions as float32, by ``video_bytes``.
         codecs: how many sequences each has.
         worst: the largest of ``max_diag``, ``kg`` and ``rmse_diag`` that the samples' descriptions have, with its sample.
@@ -59,7 +59,7 @@ def summarise(shards: StrPath | Sequence[StrPath], progress: Progress | None = N
     """
     dataset = Dataset(find_shards(shards), unlimited=unlimited)
     vertices, frames, codecs = [], [], Counter[str]()
-    triangles = video_bytes = positions = 0
+    triangles = positions = 0
     worst: dict[str, dict[str, Any]] = {}
     for number, key in enumerate(dataset.keys):
         if progress:
@@ -69,7 +69,6 @@ def summarise(shards: StrPath | Sequence[StrPath], progress: Progress | None = N
         frames.append(bitstream.n_frames)
         codecs[bitstream.codec] += 1
         triangles += bitstream.n_triangles
-        video_bytes += bitstream.n_bytes
         positions += bitstream.n_vertices * bitstream.n_frames
         _keep_worst(worst, key, dataset.description(number))
     return Summary(
@@ -79,8 +78,8 @@ def summarise(shards: StrPath | Sequence[StrPath], progress: Progress | None = N
         frames=_range(frames),
         triangles=triangles,
         bytes=sum(map(os.path.getsize, dataset.shards)),
-        video_bytes=video_bytes,
-        ratio=FLOAT32_POSITION * positions / max(video_bytes, 1),
+        video_bytes=dataset.n_bytes,
+        ratio=FLOAT32_POSITION * positions / max(dataset.n_bytes, 1),
         codecs=dict(sorted(codecs.items())),
         worst=worst,
     )

@@ -13,6 +13,7 @@ One tree, so that a caller can catch as much or as little as needed::
         ├── StrippedFile         the payload box was removed, e.g. by remuxing
         ├── TruncatedFile        the file ends early
         ├── CorruptFile          a checksum, a length or an index does not hold
+        ├── MissingSection       it shares a section with other files of a shard that it was taken out of
         └── OverBudget           it takes more memory or work than a file of its size may
 
 Third-party errors are wrapped where they arise (``raise ... from exc``); every message names the file, frame
@@ -131,6 +132,10 @@ class TruncatedFile(FormatError):
 
 class CorruptFile(FormatError):
     """A checksum, a length or an index in the file does not hold."""
+
+
+class MissingSection(FormatError):
+    """The file refers to a section that lies in the shard that it was taken out of (`gvpipe.container.shared_sections`)."""
 
 
 class OverBudget(FormatError):

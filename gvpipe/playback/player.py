@@ -24,6 +24,7 @@ from gvpipe.coding.registry import codec_class, codec_ids, open_reader, read_ski
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.mp4 import read_bytes, read_file
 from gvpipe.container.outline import Outline
+from gvpipe.container.shared_sections import FindSection
 from gvpipe.container.sources import is_remote
 from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
@@ -50,6 +51,8 @@ class Player:
         unlimited: let it take whatever memory and work it asks for; by default its size limits both
             (`gvpipe.foundation.budget`).
         data: the file's bytes, of a file in memory; ``path`` is its name in messages then.
+        shared: of a sample that was taken out of a shard: what has the sections that the shard's files share, such as
+            `gvpipe.datasets.SharedSections`.
 
     Raises:
         InputError: there is no such file.
@@ -57,13 +60,21 @@ class Player:
         FormatError: it is not a geometry video, or it is damaged; the kinds are in `gvpipe.foundation.errors`.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, unlimited: bool = False, data: bytes | None = None) -> None:
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        unlimited: bool = False,
+        data: bytes | None = None,
+        shared: FindSection | None = None,
+    ) -> None:
         check_path(path, "the geometry video")
         self.path = os.fspath(path)
         # another process may have another working directory
         self._absolute = self.path if data is not None or is_remote(self.path) else os.path.abspath(self.path)
-        self._unlimited, self._data = unlimited, data
-        self.bitstream: Bitstream = read_file(path, unlimited) if data is None else read_bytes(data, self.path, unlimited)
+        self._unlimited, self._data, self._find = unlimited, data, shared
+        read = partial(read_file, path) if data is None else partial(read_bytes, data, self.path)
+        self.bitstream: Bitstream = read(unlimited, shared)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
             self._shared = SharedReader(self.bitstream, self._reader, self.path)
@@ -72,7 +83,7 @@ class Player:
         self._cache = FrameCache(self._shared.read, group, len(self), 12 * self.bitstream.n_vertices)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(type(self), unlimited=self._unlimited, data=self._data), (self._absolute,)
+        return partial(type(self), unlimited=self._unlimited, data=self._data, shared=self._find), (self._absolute,)
 
     @property
     def faces(self) -> Int32:

@@ -19,6 +19,8 @@ import gvpipe
 from gvpipe.batch import runs
 from gvpipe.batch.encoding import hash_input
 from gvpipe.batch.runs import encode_all
+from gvpipe.datasets.entries import describe
+from gvpipe.datasets.statistics import describe_positions
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.tasks.executor import Outcome, Prepare, WorkerDied
 
@@ -79,6 +81,7 @@ def test_failures_stop_nothing_and_the_rest_is_resumed(inputs: Path, tmp_path: P
     entry = next(each for each in lines(out) if each["input"] == "in/more/b.npz")
     gvpipe.encode(inputs / "more" / "b.npz", tmp_path / "alone.mp4", "pca", quality=50)
     assert (out / "more" / "b.mp4").read_bytes() == (tmp_path / "alone.mp4").read_bytes()
+    bitstream = gvpipe.open(tmp_path / "alone.mp4").bitstream
     assert {**entry, "seconds": 0} == {
         "input": "in/more/b.npz",
         "hash": hash_input("in/more/b.npz"),
@@ -88,6 +91,8 @@ def test_failures_stop_nothing_and_the_rest_is_resumed(inputs: Path, tmp_path: P
         "seconds": 0,
         "gvpipe": gvpipe.__version__,
         "settings": {"codecs": [{"id": "pca", "quality": 50}]},
+        "description": {**describe(bitstream), **describe_positions(bitstream)},
+        "decided": "",
     }
 
     gvpipe.write(waving(4, 6), inputs / "a.npz")  # another input, a mended one, an output that has gone

@@ -115,9 +115,9 @@ def test_bad_headers_are_refused(header: bytes, message: str) -> None:
 def test_short_and_newer_payloads(files: tuple[Path, Path], tmp_path: Path) -> None:
     with pytest.raises(TruncatedFile):
         bare.unpack_bare(bare.MAGIC)
-    data = files[1].read_bytes().replace(bare.MAGIC + b"\1\0", bare.MAGIC + b"\2\0")
+    data = files[1].read_bytes().replace(bare.MAGIC + b"\1\0", bare.MAGIC + b"\3\0")
     (tmp_path / "a.mp4").write_bytes(data)
-    with pytest.raises(NewerVersion, match="container version 2"):
+    with pytest.raises(NewerVersion, match="container version 3"):
         read_file(tmp_path / "a.mp4")
 
 
