@@ -19,7 +19,7 @@ from gvpipe.grids.borders import cells_behind
 from gvpipe.grids.cells import Cells, join_cells
 from gvpipe.grids.volume import Volume
 from gvpipe.io.simulation.part_numbers import grid_runs
-from gvpipe.io.simulation.poly_content import PolyContent, poly_content
+from gvpipe.io.simulation.poly_content import HeldParts, PolyContent, poly_content
 from gvpipe.model.sequence import MeshSequence
 
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
@@ -194,12 +194,12 @@ def grid_content(
     format_name: str,
     lost: tuple[str, ...] = (),
     has_units: bool = False,
-    numbers_parts: bool = False,
+    parts: HeldParts = "",
 ) -> GridContent:
     """Return what is written; ``lost`` are names of what `grid_sequence` left out, the rest is as of `poly_content`."""
     volume = sequence.volume
     has_runs = volume is None or bool(volume.blocks) or len(sequence.parts) == 1
-    surface = poly_content(sequence, format_name, has_units, numbers_parts and has_runs)
+    surface = poly_content(sequence, format_name, has_units, parts if has_runs else "")
     counts = np.diff(surface.offsets)
     behind = np.full(len(counts), -1)
     if volume is not None:

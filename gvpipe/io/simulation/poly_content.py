@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -22,6 +23,7 @@ from gvpipe.io.losses import has_parts, lost_notes, shadow_note, shadowed
 from gvpipe.io.simulation.part_numbers import free_key, key_note, names_key, names_of_parts, numbers_of_triangles
 from gvpipe.model.sequence import MeshSequence
 
+HeldParts = Literal["", "numbers", "blocks"]
 ROLES = {"normal": "Normals", "uv": "TCoords"}
 
 
@@ -77,19 +79,19 @@ class PolyContent:
         return "".join(f" {role}={quoteattr(key)}" for role, key in named.items() if key)
 
 
-def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = False, numbers_parts: bool = False) -> PolyContent:
+def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = False, parts: HeldParts = "") -> PolyContent:
     """Return what is written of a sequence.
 
     Args:
         sequence: which is written.
         format_name: for notes.
         has_units: whether the format holds units.
-        numbers_parts: whether it holds numbers of parts, and their names.
+        parts: how it holds parts: as ``"numbers"`` of cells, as ``"blocks"`` that the writer makes, or not at all.
     """
     fields = {name: one for name, one in sequence.fields.items() if one.domain in ("vertex", "triangle")}
     attributes = {name: one for name, one in sequence.attributes.items() if one.domain in ("vertex", "triangle")}
     attributes = {name: one for name, one in attributes.items() if name not in fields}
-    part_key = free_key({*sequence.attributes, *sequence.fields}) if numbers_parts and has_parts(sequence) else ""
+    part_key = free_key({*sequence.attributes, *sequence.fields}) if parts == "numbers" and has_parts(sequence) else ""
     if part_key:
         attributes[part_key] = Attribute(numbers_of_triangles(sequence.parts, len(sequence.faces)), "triangle", "label")
     polygons = sequence.polygons
@@ -101,8 +103,8 @@ def poly_content(sequence: MeshSequence, format_name: str, has_units: bool = Fal
     flat = sequence.faces.reshape(-1)
     nodes = flat if polygons is None else flat[polygon_corners(polygons)]
     held = {*fields, *attributes, *(["polygons"] if polygons is not None else []), *(["units"] if has_units else [])}
-    held |= {"parts"} if part_key else set()
-    more = ["names of the parts' parents"] if part_key and any(part.parent for part in sequence.parts) else []
+    held |= {"parts"} if parts else set()
+    more = ["names of the parts' parents"] if parts and any(part.parent for part in sequence.parts) else []
     twice = shadow_note([name for name in shadowed(sequence) if name in fields], format_name)
     return PolyContent(
         np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]),

@@ -58,7 +58,7 @@ class Appended:
 
 def encode_vtp(sequence: MeshSequence, name: str) -> FrameEncoder:
     """Return how the frames of a sequence become .vtp files."""
-    content = poly_content(sequence, "VTP", numbers_parts=True)
+    content = poly_content(sequence, "VTP", parts="numbers")
     origin = sequence.origin
 
     def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:

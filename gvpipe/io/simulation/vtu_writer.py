@@ -47,7 +47,7 @@ def write_grids(sequence: MeshSequence, place: Callable[[int], Path]) -> tuple[s
     lost: tuple[str, ...] = ()
     if sequence.volume is not None:
         sequence, lost = grid_sequence(sequence, sequence.volume)
-    content = grid_content(sequence, "VTU", lost, numbers_parts=True)
+    content = grid_content(sequence, "VTU", lost, parts="numbers")
     is_far = bool(sequence.origin.any())
     for start, stop in sequence.spans():
         block = sequence.read_absolute(start, stop) if is_far else sequence.read(start, stop)
