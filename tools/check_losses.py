@@ -23,6 +23,8 @@ from gvpipe.model.sequence import MeshSequence
 
 FORMATS = (".pvd", ".vtkhdf", ".xdmf")
 CARRIED_AGAIN = re.compile(r"^the source has what is not carried: ")  # a note that says what the column before says
+NO_PLACE = re.compile(r"\w+ has no place for (.*); left out.*")  # but for metadata: of all files the name of the source
+OF_PARTS = ("other parts", "other volume")  # whose blocks are parts
 BY_DESIGN = re.compile(r"whole numbers alone, so kept exactly|--volume carries volume cells")
 
 
@@ -50,7 +52,10 @@ def _row(asset: Asset, folder: Path, volume: bool) -> str:
             return _line([*head, "-", f"refused: {str(exc).replace(str(folder), '')}", *("-" for _ in FORMATS)])
         said = [note for note in report.notes if not CARRIED_AGAIN.search(note) and not BY_DESIGN.search(note)]
         written = [_written(decoded, Path(held) / f"a{suffix}") for suffix in FORMATS]
-    return _line([*head, ", ".join(report.not_carried) or "nothing", "; ".join(said) or "-", *written])
+    left = [name for name in report.not_carried if not name.startswith("field data")]
+    n_whole = len(report.not_carried) - len(left)
+    left += [f"field data ({n_whole})"] if n_whole else []
+    return _line([*head, ", ".join(left) or "nothing", "; ".join(said) or "-", *written])
 
 
 def _written(given: MeshSequence, path: Path) -> str:
@@ -58,9 +63,15 @@ def _written(given: MeshSequence, path: Path) -> str:
     try:
         notes = gvpipe.write(given, path)
         found = gvpipe.read(path, volume=given.volume is not None)
-        return "; ".join([*notes, *_differences(given, found)]) or "same"
     except GvpipeError as exc:
         return f"error: {str(exc).replace(str(path.parent), '')}"
+    said = []
+    for note in notes:
+        lost = NO_PLACE.fullmatch(note)
+        names = [name for name in lost.group(1).split(", ") if name != "metadata"] if lost else []
+        said += [f"no {', '.join(names)}"] if names else [] if lost else [note]
+    differing = [each for each in _differences(given, found) if not ("no parts" in said and each in OF_PARTS)]
+    return "; ".join([*said, *differing]) or "same"
 
 
 def _differences(given: MeshSequence, found: MeshSequence) -> list[str]:

@@ -245,3 +245,14 @@ def test_times_of_hdf_that_run_backwards(tmp_path: Path) -> None:
     found = gvpipe.read(tmp_path / "a.vtkhdf")
     assert found.times.tolist() == [2, 1, 0]
     assert any("do not rise (frame 0 is at 2 s, frame 1 at 1 s)" in note for note in found.notes)
+
+
+@both
+def test_numbers_that_float32_rounds_to_zero(volume: bool, tmp_path: Path) -> None:
+    """Memory that a program left as it was is no reason to refuse a file."""
+    steps = moving()
+    for k, step in enumerate(steps):
+        step["cell"] = numbers("status", np.arange(8) * 1e-308 * (k + 1))
+    found = gvpipe.read(series(tmp_path, steps), volume=volume)
+    assert found.fields["status"].dtype == np.float32
+    gvpipe.encode(found, tmp_path / "a.mp4", "pca")
