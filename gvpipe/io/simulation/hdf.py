@@ -17,6 +17,8 @@ from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.limits import check_bytes
 
 MOST_TEXTS = 100_000
+MOST_TEXT_BYTES = 1 << 24  # of all texts of a dataset
+TEXTS_TOGETHER = 100
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -98,7 +100,7 @@ class HdfFile:
         return np.asarray(found[start:stop])
 
     def texts(self, path: str) -> list[str]:
-        """The texts ``(n,)`` of a dataset, `MOST_TEXTS` at most; raises `ValueError`."""
+        """The texts ``(n,)`` of a dataset, `MOST_TEXTS` and `MOST_TEXT_BYTES` at most; raises `ValueError`."""
         found = self.find(path)
         if not isinstance(found, self._h5py.Dataset) or self._h5py.check_string_dtype(found.dtype) is None:
             raise ValueError(f"{path!r} holds no texts")
@@ -106,13 +108,16 @@ class HdfFile:
             raise ValueError(f"{path!r} takes its texts from other files, which is not followed")
         if len(found.shape) != 1 or found.shape[0] > MOST_TEXTS:
             raise ValueError(f"{path!r} has shape {found.shape}; a list of at most {MOST_TEXTS} texts is needed")
+        n_bytes = found.shape[0] * found.dtype.itemsize
         texts: list[str] = []
-        n_bytes = 0
-        for row in range(found.shape[0]):  # one by one: all may be one long text of the file
-            held = bytes(found[row])
-            n_bytes += len(held)
-            check_bytes((n_bytes,), 1, self.size, repr(path))
-            texts.append(held.decode("utf-8", "replace"))
+        for start in range(0, found.shape[0], TEXTS_TOGETHER):  # some at a time: all may be one long text of the file
+            if n_bytes > MOST_TEXT_BYTES:
+                break
+            held = [bytes(each) for each in found[start : start + TEXTS_TOGETHER]]
+            n_bytes += sum(map(len, held))
+            texts += [each.decode("utf-8", "replace") for each in held]
+        if n_bytes > MOST_TEXT_BYTES:
+            raise ValueError(f"{path!r} takes {n_bytes} bytes; at most {MOST_TEXT_BYTES} are read")
         return texts
 
     def links(self, path: str) -> list[tuple[str, str]]:

@@ -16,7 +16,7 @@ from gvpipe.foundation.arrays import Array, Float64, Floats, Int64
 from gvpipe.grids.cells import Cells, join_cells
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.simulation.blocks import join_blocks
+from gvpipe.io.simulation.blocks import MOST_DEPTH, join_blocks
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
 from gvpipe.io.simulation.part_numbers import with_blocks
@@ -98,6 +98,8 @@ def _links(file: HdfFile, path: str) -> list[tuple[str, str]]:
     while waiting:
         name, target = waiting.pop()
         n_met += 1
+        if target.count("/") > MOST_DEPTH:
+            raise ValueError(f"its blocks are nested more than {MOST_DEPTH} deep")
         if n_met > MAX_BLOCKS:
             raise ValueError(f"its assembly has more than {MAX_BLOCKS} links; at most {MAX_BLOCKS} are read")
         if name and (file.attribute(target, "Type") or not target.startswith(f"{path}/")):

@@ -275,3 +275,44 @@ def test_frames_of_many_parts_are_read_once(tmp_path: Path) -> None:
     assert len(asked) == 1
     found = gvpipe.read(tmp_path / "a.vtkhdf")
     assert found.parts == parts and np.array_equal(found[:], Counted()[0:5])
+
+
+@pytest.mark.parametrize("kind", ["square", "long", "number", "many"])
+def test_texts_of_hdf_that_cannot_be(kind: str, tmp_path: Path) -> None:
+    """Names of another shape, far longer than the file, or too many are refused; numbers are no names."""
+    h5py = pytest.importorskip("h5py")
+    gvpipe.write(three_squares(True), tmp_path / "a.vtkhdf")
+    with h5py.File(tmp_path / "a.vtkhdf", "a") as file:
+        group = file["VTKHDF/FieldData"]
+        del group["part_names"]
+        if kind == "square":
+            group.create_dataset("part_names", data=np.array([[b"a", b"b"]]))
+        elif kind == "number":
+            group["part_names"] = np.arange(3)
+        else:
+            size = (200_000,) if kind == "many" else (50_000,)
+            group.create_dataset("part_names", size, f"S{10 if kind == 'many' else 50_000}", chunks=(100,), compression="gzip",
+                                 fillvalue=b"a" * (10 if kind == "many" else 50_000))  # fmt: skip
+    if kind == "number":
+        found = gvpipe.read(tmp_path / "a.vtkhdf")
+        assert "part" in found.attributes and not found.parts
+        return
+    with pytest.raises(
+        InputError, match=r"a\.vtkhdf: frame 0 .*part_names.*(a list of at most|bytes; at most)"
+    ):
+        gvpipe.read(tmp_path / "a.vtkhdf")
+
+
+@pytest.mark.parametrize("kind", ["circle", "outside"])
+def test_assemblies_that_go_nowhere(kind: str, tmp_path: Path) -> None:
+    """A group that holds itself ends; a link to another file is not followed."""
+    h5py = pytest.importorskip("h5py")
+    gvpipe.write(three_squares(), tmp_path / "a.vtkhdf")
+    with h5py.File(tmp_path / "a.vtkhdf", "a") as file:
+        assembly = file["VTKHDF/Assembly"]
+        if kind == "circle":
+            assembly["again"], assembly["once_more"] = assembly, assembly  # hard links
+        else:
+            assembly["far"] = h5py.ExternalLink("/etc/hostname", "/VTKHDF")
+    with pytest.raises(InputError, match=r"a\.vtkhdf.*(nested more than|another file)"):
+        gvpipe.read(tmp_path / "a.vtkhdf")
