@@ -9,8 +9,10 @@ import numpy as np
 
 from gvpipe.asset.part import Part
 from gvpipe.io.simulation.poly_content import PolyContent
-from gvpipe.io.simulation.vtkhdf import MAX_BLOCKS, ROOT
+from gvpipe.io.simulation.vtkhdf import ROOT
 from gvpipe.model.sequence import MeshSequence
+
+MOST_BLOCKS = 1000  # to write or to open one takes 15 ms, so that more parts are numbers of cells
 
 
 class Block(NamedTuple):
@@ -37,7 +39,7 @@ def own_blocks(parts: Sequence[Part], n_vertices: int) -> list[str]:
     """
     edges = [0, *(part.vertices[1] for part in parts)]
     follow = all(part.vertices[0] == edge for part, edge in zip(parts, edges, strict=False))
-    if len(parts) < 2 or len(parts) > MAX_BLOCKS or not follow or edges[-1] != n_vertices:
+    if len(parts) < 2 or len(parts) > MOST_BLOCKS or not follow or edges[-1] != n_vertices:
         return []
     if any(part.triangles[1] == part.triangles[0] for part in parts):
         return []

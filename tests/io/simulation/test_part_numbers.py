@@ -297,9 +297,7 @@ def test_texts_of_hdf_that_cannot_be(kind: str, tmp_path: Path) -> None:
         found = gvpipe.read(tmp_path / "a.vtkhdf")
         assert "part" in found.attributes and not found.parts
         return
-    with pytest.raises(
-        InputError, match=r"a\.vtkhdf: frame 0 .*part_names.*(a list of at most|bytes; at most)"
-    ):
+    with pytest.raises(InputError, match=r"a\.vtkhdf: frame 0 .*part_names.*(a list of at most|bytes; at most)"):
         gvpipe.read(tmp_path / "a.vtkhdf")
 
 
