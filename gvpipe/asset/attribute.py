@@ -162,10 +162,16 @@ def as_numbers(given: Any, name: str) -> Array:
         return values.astype(np.float32)
 
 
+SMALLEST_FLOAT32 = 2.0**-149
+
+
 def needs_float64(blocks: Sequence[Array]) -> bool:
-    """Whether float32 would move a value by more than 1e-4 of the range of all ``blocks``."""
+    """Whether float32 would move a value by more than 1e-4 of the range of all ``blocks``.
+
+    What float32 rounds to zero does not count: programs that leave memory as it is write such numbers, as of 1e-308.
+    """
     lost, spread = rounding_of(blocks)
-    return bool(np.isfinite(lost)) and lost > MOST_ROUNDED * spread > 0
+    return bool(np.isfinite(lost)) and lost > SMALLEST_FLOAT32 and lost > MOST_ROUNDED * spread > 0
 
 
 def rounding_of(blocks: Sequence[Array]) -> tuple[float, float]:

@@ -46,7 +46,11 @@ if TYPE_CHECKING:
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1; the others are not read. Either may be left out.")
 @click.option("--part", "parts", multiple=True, metavar="NAME", help="Write this part only; repeat for more.")
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail of a geometry video; higher is coarser.")
-@click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...")
+@click.option(
+    "--split",
+    is_flag=True,
+    help="Write a file for each run of frames with the same triangles: NAME-000.glb, ...",
+)
 @click.option("--skin", is_flag=True, help="Find a skeleton, and write a .glb or USD file that it moves.")
 @click.option(
     "--joints",
@@ -177,7 +181,7 @@ def _convert_split(
     """Convert each run of frames of one topology, with a skeleton of its own if one is wanted."""
     from gvpipe.cli.choices import chosen
     from gvpipe.cli.skeletons import find_skin
-    from gvpipe.cli.splitting import write_runs
+    from gvpipe.cli.splitting import is_list, on_one_clock, write_runs
     from gvpipe.playback import files
 
     def write(run: Run, path: Path) -> tuple[dict[str, int], list[str]]:
@@ -191,6 +195,8 @@ def _convert_split(
     with source_path(source) as given, out.progress() as progress:
         runs = files.read_runs(given, **options)
         ready = [replace(run, sequence=chosen(run.sequence, parts, None, "convert", progress)) for run in runs]
+        if is_list(target):
+            ready = on_one_clock(ready)
         written = write_runs(ready, target, write)
     every = (note for run, (_, (_, said)) in zip(runs, written, strict=True) for note in (*run.sequence.notes, *said))
     noticed = list(dict.fromkeys(every))
@@ -210,10 +216,13 @@ def _convert_split(
         | counts
         for (name, (counts, _)), run in zip(written, ready, strict=True)
     ]
-    out.json({"files": listed, "notes": noticed})
+    one = {"list": target} if is_list(target) and len(listed) > 1 else {}
+    out.json({"files": listed, **one, "notes": noticed})
     for each in listed:
         shape = shape_of(each["frames"], each["vertices"])
         out.text(f"{shown(source, STDIN)}, frames {each['start']}:{each['stop']} -> {each['output']} ({shape})")
+    if one:
+        out.text(f"{target} lists the frames of all files")
 
 
 def _level_reader(source: str, lod: int, unlimited: bool) -> Callable[..., MeshSequence]:

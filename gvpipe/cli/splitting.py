@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -17,6 +19,8 @@ Result = TypeVar("Result")
 
 def write_runs(runs: Sequence[Run], target: str, write: Callable[[Run, Path], Result]) -> list[tuple[str, Result]]:
     """Write each run to a file; return the files' names and what ``write`` returned.
+
+    Beside several .pvd, one of the output's own name lists the frames of all of them.
 
     Args:
         runs: of the input.
@@ -41,7 +45,29 @@ def write_runs(runs: Sequence[Run], target: str, write: Callable[[Run, Path], Re
             except (InputError, OutputError) as exc:
                 raise type(exc)(str(exc).replace(str(apart), str(folder))) from exc
             _join(apart, temporary, folder)
+        if is_list(name) and name not in names:
+            from gvpipe.io.simulation.pvd_writer import join_lists
+
+            join_lists([temporary / own for own in names], temporary / name)
     return results
+
+
+def is_list(target: str) -> bool:
+    """Whether an output is a list of files with times."""
+    return Path(target).suffix.lower() == ".pvd"
+
+
+def on_one_clock(runs: Sequence[Run]) -> list[Run]:
+    """Runs whose times follow each other: those of an input without times are numbers of frames, by the rate."""
+    edges = [(float(run.sequence.times[0]), float(run.sequence.times[-1])) for run in runs]
+    if all(before[1] < behind[0] for before, behind in pairwise(edges)):
+        return list(runs)
+    made = []
+    for run in runs:
+        start = run.start / run.sequence.fps
+        metadata = replace(run.sequence.metadata, start_time=start, times=())
+        made.append(replace(run, sequence=replace(run.sequence, metadata=metadata)))
+    return made
 
 
 def run_names(name: str, count: int) -> list[str]:

@@ -26,13 +26,18 @@ def lost_notes(sequence: MeshSequence, format_name: str, held: Collection[str], 
     named = [name for name in (*sequence.attributes, *sequence.fields) if name not in held]
     others = {
         "polygons": sequence.polygons is not None,
-        "parts": len(sequence.parts) > 1 or any(part.name for part in sequence.parts),
+        "parts": has_parts(sequence),
         "materials": bool(sequence.materials),
         "metadata": sequence.metadata != NO_METADATA,
         "units": any(each.unit for name, each in (*sequence.attributes.items(), *sequence.fields.items()) if name in held),
     }
     left_out = [name for name, is_there in others.items() if is_there and name not in held]
     return not_held(format_name, [*dict.fromkeys(named), *left_out, *more])
+
+
+def has_parts(sequence: MeshSequence) -> bool:
+    """Whether a sequence has several parts, or one with a name."""
+    return len(sequence.parts) > 1 or any(part.name for part in sequence.parts)
 
 
 def shadowed(sequence: MeshSequence) -> list[str]:

@@ -15,6 +15,7 @@ import base64
 import html
 import os
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -40,6 +41,14 @@ AXES = ("y", "z")
 QUALITY = 90.0  # of a conversion: KG 0.044, which makes the error of a file of quality 75 (KG 0.14) 5 % larger
 MOST_ENCODES = 3
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~"  # no "<", which ends scripts
+NEXT = """let shown = 0; // what plays behind it: the next file, and the first behind the last
+const shows = document.querySelector("geometry-video");
+shows.addEventListener("ended", () => {
+  shown = (shown + 1) % count;
+  shows.addEventListener("ready", () => shows.play().catch(() => {}), { once: true });
+  shows.src = shown ? `#video${shown}` : "#video";
+});
+"""
 INSIDE = 0.97  # of the error allowed: aimed at after an encode that missed it
 
 
@@ -88,8 +97,9 @@ def export_html(
     camera: str | tuple[float, float] | None = None,
     shading: str = "smooth",
     unlimited: bool = False,
+    then: Sequence[str | os.PathLike[str]] = (),
 ) -> ExportReport:
-    """Write a page of one file that plays a geometry video.
+    """Write a page of one file that plays a geometry video, or several, one after the other.
 
     Args:
         source: the geometry video, of any codec, or its address (``https://...``).
@@ -108,9 +118,10 @@ def export_html(
         camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
         shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
+        then: geometry videos that play behind the first, as pieces of a run whose topology changes. They are not converted.
 
     Raises:
-        InputError: there is no such file or field, or an argument cannot be used.
+        InputError: there is no such file or field, an argument cannot be used, or browsers do not play one of several files.
         FormatError: not a geometry video, or a damaged one.
         OutputError: the page cannot be written; no part of it is left.
     """
@@ -123,6 +134,10 @@ def export_html(
     if not os.path.isdir(target.parent):
         raise OutputError(f"cannot write {target}: no folder {target.parent}; create it first")
     player = Player(source, unlimited=unlimited)
+    pieces = [Player(each, unlimited=unlimited) for each in then]
+    for piece in (player, *pieces) if pieces else ():
+        if convert or browser_obstacle(piece.bitstream):
+            raise InputError(f"{piece.path} is one of several, which are not converted; encode it for browsers (--for web)")
     if up is None:
         up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
     view = page_view(
@@ -138,10 +153,8 @@ def export_html(
     )
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
-        data = (
-            Path(player.path).read_bytes() if player.bitstream.layout != BARE and not is_remote(player.path) else _plain(player)
-        )
-        return replace(_write_page(player.path, data, target, up, view), unfinished=player.bitstream.is_unfinished)
+        report = _write_page(player.path, _as_it_is(player), target, up, view, [_as_it_is(piece) for piece in pieces])
+        return replace(report, unfinished=any(each.bitstream.is_unfinished for each in (player, *pieces)))
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
@@ -154,6 +167,12 @@ def export_html(
     return ExportReport(
         page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg
     )
+
+
+def _as_it_is(player: Player) -> bytes:
+    """A geometry video as a file that a page can hold."""
+    is_whole = player.bitstream.layout != BARE and not is_remote(player.path)
+    return Path(player.path).read_bytes() if is_whole else _plain(player)
 
 
 def _plain(player: Player) -> bytes:
@@ -184,7 +203,7 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -> ExportReport:
+def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
@@ -195,12 +214,22 @@ def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -
         "DIGITS": DIGITS,
         "PLAYER": _base85(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),
         "VIDEO": _base64(data),
+        "LOOP": "" if more else " loop",
+        "MORE": _behind(more) if more else "",
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
     text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
     with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
-    return ExportReport(len(text), len(data))
+    return ExportReport(len(text), len(data) + sum(map(len, more)))
+
+
+def _behind(more: Sequence[bytes]) -> str:
+    """The elements of files that play behind the first, and what shows the next one where one has ended."""
+    held = "".join(
+        f'<script type="text/plain" id="video{number}">{_base64(data)}</script>\n' for number, data in enumerate(more, 1)
+    )
+    return f"{held}<script>\nconst count = {len(more) + 1};\n{NEXT}</script>\n"
 
 
 def _base64(data: bytes) -> str:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -175,3 +176,30 @@ def test_a_later_change_may_be_met_first() -> None:
 
     with pytest.raises(InputError, match="it changes"):
         find_runs(broken)
+
+
+@pytest.mark.parametrize("has_times", [False, True])
+def test_one_list_of_all_pieces(tmp_path: Path, run: Any, has_times: bool) -> None:
+    """Beside the .pvd of each run, one lists all frames with their times."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    times = [0.0, 0.5, 2.0, 2.5, 7.0]
+    listed = ""
+    for frame, time in enumerate(times):
+        faces = np.array([[0, 1, 2], [1, 3, 2]] if frame < 2 else [[0, 1, 2]], np.int32)
+        points = np.array([[0, 0, frame], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32)
+        gvpipe.write(gvpipe.MeshSequence(points[None], faces, 1.0), folder / f"a{frame}.vtp")
+        listed += f'<DataSet timestep="{time}" file="a{frame}.vtp"/>'
+    (folder / "a.pvd").write_text(f'<VTKFile type="Collection"><Collection>{listed}</Collection></VTKFile>')
+    source = folder / "a.pvd" if has_times else folder
+    ended = run("convert", source, tmp_path / "out.pvd", "--split", "--json")
+    assert ended.status == 0 and json.loads(ended.out)["list"] == str(tmp_path / "out.pvd")
+    assert sorted(path.name for path in tmp_path.glob("*.pvd")) == ["out-000.pvd", "out-001.pvd", "out.pvd"]
+    found = ElementTree.parse(tmp_path / "out.pvd").findall("Collection/DataSet")
+    expected = times if has_times else [frame / 30 for frame in range(5)]
+    assert [float(each.get("timestep", "")) for each in found] == pytest.approx(expected)
+    assert all((tmp_path / each.get("file", "")).is_file() for each in found)
+    again = run("convert", tmp_path / "out.pvd", tmp_path / "again.pvd", "--split")
+    assert again.status == 0 and "again.pvd lists the frames of all files" in again.out
+    assert run("convert", source, tmp_path / "one.pvd", "--split", "--frames", ":2").status == 0
+    assert (tmp_path / "one.pvd").is_file() and not (tmp_path / "one-000.pvd").exists()

@@ -71,7 +71,7 @@ def split_columns(frames: FrameFiles) -> Columns:
     for name in moving:
         frames.keep(name, given[name].values, 1)
     meshes = [frames.load(frame) for frame in samples] if given else []
-    looked_at = meshes or _last(frames)
+    looked_at = meshes or _some(frames, samples)
     late = sorted({name for mesh in looked_at for name in mesh.animated} - {*given, *left})
     settled = {
         name
@@ -106,12 +106,14 @@ def split_columns(frames: FrameFiles) -> Columns:
     )
 
 
-def _last(frames: FrameFiles) -> list[Mesh]:
-    """The last of several frames, where it lies on disk and can be read."""
-    if len(frames.paths) > 1 and not is_elsewhere(frames.paths[-1]):
-        with contextlib.suppress(InputError):  # which whoever asks for that frame gets
-            return [frames.load(len(frames.paths) - 1)]
-    return []
+def _some(frames: FrameFiles, samples: list[int]) -> list[Mesh]:
+    """Those of some frames that lie on disk and can be read."""
+    found = []
+    for frame in samples:
+        if not is_elsewhere(frames.paths[frame]):
+            with contextlib.suppress(InputError):  # which whoever asks for that frame gets
+                found.append(frames.load(frame))
+    return found
 
 
 def _keep(frames: FrameFiles, names: set[str], given: dict[str, FrameValues], n_frames: int) -> None:

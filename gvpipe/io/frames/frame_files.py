@@ -17,6 +17,7 @@ from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.io.damage import FRAME_AGAIN, check_file, reading
 from gvpipe.io.fetching import borrowed
 from gvpipe.io.formats import FRAME_FORMATS
+from gvpipe.io.frames.column_types import as_type
 from gvpipe.io.frames.spool import Spool
 from gvpipe.io.mesh import Loader, Mesh
 from gvpipe.model.origin import choose_origin, narrow, rounding
@@ -96,7 +97,7 @@ class FrameFiles:
                 f"{self.paths[frame].name} has {f'{name!r} {values.shape}' if values.size else f'no {name!r}'}, "
                 f"{self.paths[0].name} has it {first.shape}; all frames need the same properties"
             )
-        return np.ascontiguousarray(values, first.dtype)
+        return np.ascontiguousarray(as_type(values, first.dtype, f"{self.paths[frame]}: frame {frame}: {name!r}"))
 
     def keep(self, name: str, first: Array, n_frames: int) -> None:
         """Keep a column of the frames that load from now on; it is ``first`` in the first ``n_frames``."""

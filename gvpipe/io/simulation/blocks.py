@@ -50,16 +50,22 @@ def join_blocks(named: list[Named]) -> Dataset:
     cell_data = join_arrays([each.cell_data for each in sets], "blocks", lost)
     for each in sets:
         lost.add_all(each.not_carried)
-    names = _unlike([name or f"block_{number}" for number, (name, _) in enumerate(named)])
+    runs = [run for number, (name, each) in enumerate(named) for run in _runs(name or f"block_{number}", each, pieces[number])]
+    names = _unlike([name for name, _ in runs])
     return Dataset(
         lambda: np.concatenate([each.points() for each in sets]),
         cells,
         point_data,
         cell_data,
-        tuple((name, len(each.types)) for name, each in zip(names, pieces, strict=True)),
+        tuple((name, count) for name, (_, count) in zip(names, runs, strict=True)),
         tuple(dict.fromkeys(note for each in sets for note in each.notes)),
         lost.names,
     )
+
+
+def _runs(name: str, each: Dataset, cells: Cells) -> list[tuple[str, int]]:
+    """Names and sizes of what becomes a block: a data set, or its own blocks."""
+    return [(f"{name}/{own}", count) for own, count in each.blocks] or [(name, len(cells.types))]
 
 
 def load_multi_block(path: Path) -> Dataset:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -160,7 +161,7 @@ def _fits(kind: str, values: Array) -> bool:
 
 
 def block_parts(step: Dataset, surface: Surface) -> tuple[Part, ...]:
-    """A part for each block that has triangles; all parts share the vertices."""
+    """A part for each block that has triangles, with a range of vertices of its own where no two blocks share any."""
     if not step.blocks:
         return ()
     ends = np.cumsum([count for _, count in step.blocks])
@@ -170,4 +171,21 @@ def block_parts(step: Dataset, surface: Surface) -> tuple[Part, ...]:
         if stop > start:
             parts.append(Part(name, (0, len(surface.points)), (start, stop)))
         start = stop
-    return tuple(parts)
+    ranges = _own_ranges([part.triangles for part in parts], surface)
+    return tuple(replace(part, vertices=each) for part, each in zip(parts, ranges, strict=True)) if ranges else tuple(parts)
+
+
+def _own_ranges(triangles: list[tuple[int, int]], surface: Surface) -> list[tuple[int, int]]:
+    """A range of vertices for each range of triangles, one after the other; none where these share vertices or take turns.
+
+    Vertices that no triangle has belong to the range before them.
+    """
+    starts = np.array([start for start, _ in triangles], np.int64)
+    if not len(starts):
+        return []
+    low = np.minimum.reduceat(surface.faces.min(axis=1), starts)
+    high = np.maximum.reduceat(surface.faces.max(axis=1), starts)
+    if (low[1:] <= high[:-1]).any():
+        return []
+    edges = [0, *low[1:].tolist(), len(surface.points)]
+    return list(pairwise(edges))

@@ -1,6 +1,7 @@
 """What unstructured grids hold of a sequence with a volume: all points in the grid's order, volume cells, then flat cells.
 
-Flat cells are the surface's polygons that are no face of a volume cell. Numbers that the inside has not have no place.
+Flat cells are the surface's polygons that are no face of a volume cell. Parts are runs of cells: the volume's blocks, then the
+parts of flat cells. Numbers that the inside has not have no place.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from gvpipe.foundation.arrays import Array, Floats, Frames, Int64
 from gvpipe.grids.borders import cells_behind
 from gvpipe.grids.cells import Cells, join_cells
 from gvpipe.grids.volume import Volume
-from gvpipe.io.simulation.poly_content import PolyContent, poly_content
+from gvpipe.io.simulation.part_numbers import grid_runs
+from gvpipe.io.simulation.poly_content import HeldParts, PolyContent, poly_content
 from gvpipe.model.sequence import MeshSequence
 
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
@@ -103,6 +105,9 @@ def grid_sequence(sequence: MeshSequence, volume: Volume) -> tuple[MeshSequence,
         attributes=attributes,
         fields=fields,
         polygons=sequence.polygons,
+        parts=tuple(replace(part, vertices=(0, len(order))) for part in sequence.parts),
+        materials=sequence.materials,
+        images=sequence.images,
         metadata=sequence.metadata,
         volume=inside_only,
     )
@@ -184,9 +189,17 @@ class GridContent:
         return np.concatenate([np.broadcast_to(block, (stop - start, *block.shape[1:])), flat], axis=1)
 
 
-def grid_content(sequence: MeshSequence, format_name: str, lost: tuple[str, ...] = (), has_units: bool = False) -> GridContent:
-    """Return what is written; ``lost`` are names of what `grid_sequence` left out."""
-    surface, volume = poly_content(sequence, format_name, has_units), sequence.volume
+def grid_content(
+    sequence: MeshSequence,
+    format_name: str,
+    lost: tuple[str, ...] = (),
+    has_units: bool = False,
+    parts: HeldParts = "",
+) -> GridContent:
+    """Return what is written; ``lost`` are names of what `grid_sequence` left out, the rest is as of `poly_content`."""
+    volume = sequence.volume
+    has_runs = volume is None or bool(volume.blocks) or len(sequence.parts) == 1
+    surface = poly_content(sequence, format_name, has_units, parts if has_runs else "")
     counts = np.diff(surface.offsets)
     behind = np.full(len(counts), -1)
     if volume is not None:
@@ -196,6 +209,8 @@ def grid_content(sequence: MeshSequence, format_name: str, lost: tuple[str, ...]
     flat = np.flatnonzero(behind < 0)
     types = np.where(counts[flat] == 3, TRIANGLE, np.where(counts[flat] == 4, QUAD, POLYGON)).astype(np.uint8)
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(counts[flat])])
+    if volume is not None and surface.part_key:
+        surface, volume = _with_runs(surface, volume, sequence, flat)
     owner = np.repeat(behind < 0, counts)
     polygons = Cells(types, offsets, surface.nodes[owner])
     cells = polygons if volume is None else join_cells([volume.cells, polygons], [0, 0])
@@ -204,6 +219,18 @@ def grid_content(sequence: MeshSequence, format_name: str, lost: tuple[str, ...]
     without = [name for name, one in both.items() if one.domain == "triangle" and volume is not None and name not in inside]
     return GridContent(
         cells, surface, sequence.n_vertices, flat, volume, (*surface.notes, *inside_notes(format_name, (*lost, *without)))
+    )
+
+
+def _with_runs(surface: PolyContent, volume: Volume, sequence: MeshSequence, flat: Int64) -> tuple[PolyContent, Volume]:
+    """The same with numbers of parts that rise over the volume's cells and the flat ones behind them."""
+    key = surface.part_key
+    parts = np.asarray(surface.attributes[key])[:, 0]
+    numbers, names, of_part = grid_runs(volume.blocks, sequence.parts, parts[surface.first[flat]], len(volume.cells.types))
+    renumbered = Attribute(of_part[parts].astype(np.int32), "triangle", "label")
+    return (
+        replace(surface, attributes={**surface.attributes, key: renumbered}, part_names=names),
+        replace(volume, cell_fields={**volume.cell_fields, key: Field(numbers[None], "cell", "label")}),
     )
 
 

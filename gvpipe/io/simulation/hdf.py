@@ -16,6 +16,9 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.io.damage import WHOLE, reading
 from gvpipe.io.simulation.limits import check_bytes
 
+MOST_TEXTS = 100_000
+MOST_TEXT_BYTES = 1 << 24  # of all texts of a dataset
+TEXTS_TOGETHER = 100
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -95,6 +98,36 @@ class HdfFile:
             raise ValueError(f"{path!r} has {n_rows} rows; rows {start} to {stop} are needed")
         check_bytes((stop - start, *found.shape[1:]), found.dtype.itemsize, self.size, repr(path))
         return np.asarray(found[start:stop])
+
+    def texts(self, path: str) -> list[str]:
+        """The texts ``(n,)`` of a dataset, `MOST_TEXTS` and `MOST_TEXT_BYTES` at most; raises `ValueError`."""
+        found = self.find(path)
+        if not isinstance(found, self._h5py.Dataset) or self._h5py.check_string_dtype(found.dtype) is None:
+            raise ValueError(f"{path!r} holds no texts")
+        if found.is_virtual or found.external:
+            raise ValueError(f"{path!r} takes its texts from other files, which is not followed")
+        if len(found.shape) != 1 or found.shape[0] > MOST_TEXTS:
+            raise ValueError(f"{path!r} has shape {found.shape}; a list of at most {MOST_TEXTS} texts is needed")
+        n_bytes = found.shape[0] * found.dtype.itemsize
+        texts: list[str] = []
+        for start in range(0, found.shape[0], TEXTS_TOGETHER):  # some at a time: all may be one long text of the file
+            if n_bytes > MOST_TEXT_BYTES:
+                break
+            held = [bytes(each) for each in found[start : start + TEXTS_TOGETHER]]
+            n_bytes += sum(map(len, held))
+            texts += [each.decode("utf-8", "replace") for each in held]
+        if n_bytes > MOST_TEXT_BYTES:
+            raise ValueError(f"{path!r} takes {n_bytes} bytes; at most {MOST_TEXT_BYTES} are read")
+        return texts
+
+    def links(self, path: str) -> list[tuple[str, str]]:
+        """Names in a group and the paths that they lead to, in the file's order; names of datasets, too."""
+        group = self.find(path)
+        found = []
+        for name in self.names(path):
+            link = group.get(name, getlink=True)
+            found.append((name, link.path if isinstance(link, self._h5py.SoftLink) else f"{path}/{name}"))
+        return found
 
     def has_numbers(self, path: str) -> bool:
         """Whether what lies at a path is no dataset of texts or of other things that are no numbers."""

@@ -5,6 +5,7 @@ Files are .vtp, or .vtu of a sequence with a volume.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -13,6 +14,9 @@ from gvpipe.foundation.errors import OutputError
 from gvpipe.io.frames.writer import write_frames
 from gvpipe.io.simulation.vtu_writer import write_grids
 from gvpipe.model.sequence import MeshSequence
+
+HEAD = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>\n'
+TAIL = "</Collection></VTKFile>\n"
 
 
 def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
@@ -30,7 +34,6 @@ def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
         f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{name}_{frame:0{digits}d}{suffix}")}/>\n'
         for frame, time in enumerate(sequence.times)
     )
-    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>\n'
     with atomic_files(path.parent) as folder:
         try:
             if sequence.volume is None:
@@ -39,5 +42,11 @@ def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
                 notes = write_grids(sequence, lambda frame: folder / name / f"{name}_{frame:0{digits}d}.vtu")
         except OutputError as exc:
             raise OutputError(str(exc).replace(str(folder), str(path.parent)).partition("; frames ")[0]) from exc
-        (folder / path.name).write_text(f"{head}{listed}</Collection></VTKFile>\n", "utf-8")
+        (folder / path.name).write_text(f"{HEAD}{listed}{TAIL}", "utf-8")
     return notes
+
+
+def join_lists(lists: Sequence[Path], path: Path) -> None:
+    """Write one .pvd that lists the files of several, which `write_pvd` wrote into its folder, in their order."""
+    listed = (each.read_text("utf-8").removeprefix(HEAD).removesuffix(TAIL) for each in lists)
+    path.write_text(f"{HEAD}{''.join(listed)}{TAIL}", "utf-8")

@@ -12,7 +12,7 @@ from gvpipe.foundation.arrays import Array, Float32, Float64, Floats
 from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.grids.cells import Cells
 from gvpipe.io.damage import reading
-from gvpipe.io.frames.column_types import can_be_still, field_type
+from gvpipe.io.frames.column_types import as_type, can_be_still, field_type
 from gvpipe.io.mesh import FrameValues
 from gvpipe.io.simulation.dataset import Dataset, surface_values
 from gvpipe.io.simulation.pieces import Welding, without_duplicates
@@ -128,17 +128,17 @@ class StepColumn:
         self.shape: tuple[int, ...] = (frames.shape[0], *first.shape)
         self.dtype: Any = first.dtype
         if first.dtype == np.float64:
-            self.dtype = field_type([first, *(frames.column(name, frame, on).values for frame in _samples(frames))])
+            self.dtype = field_type([first, *(frames.column(name, frame, on).values for frame in sampled_frames(frames))])
 
     def __getitem__(self, key: slice, /) -> Array:
         frames = range(*key.indices(self.shape[0]))
         block = np.empty((len(frames), *self.shape[1:]), self.dtype)
         for i, frame in enumerate(frames):
             values = self._frames.column(self._name, frame, self._on).values
+            what = f"{self._frames.path}: frame {frame}: {self._name!r}"
             if values.shape != self.shape[1:]:
-                raise InputError(f"{self._name!r} is {values.shape} in frame {frame} and {self.shape[1:]} in the first")
-            with np.errstate(over="ignore"):
-                block[i] = values
+                raise InputError(f"{what} has shape {values.shape}, and {self.shape[1:]} in frame 0; save all with one shape")
+            block[i] = as_type(values, self.dtype, what)
         return block
 
 
@@ -146,12 +146,12 @@ def is_still(frames: StepFrames, name: str, first: Array, on: Surface | None = N
     """Whether numbers are finite and the same in all frames; ``on`` as of `StepFrames.column`."""
     if not can_be_still(first):
         return False
-    samples = _samples(frames)
+    samples = sampled_frames(frames)
     rest = (frame for frame in range(1, frames.shape[0]) if frame not in samples)
     return all(np.array_equal(frames.column(name, frame, on).values, first) for frame in (*samples, *rest))
 
 
-def _samples(frames: StepFrames) -> list[int]:
+def sampled_frames(frames: StepFrames) -> list[int]:
     """Some frames behind the first."""
     n_frames = frames.shape[0]
     return np.unique(np.linspace(1, n_frames - 1, SAMPLES).astype(int)).tolist() if n_frames > 1 else []

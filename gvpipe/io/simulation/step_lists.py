@@ -24,6 +24,7 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.dataset import Dataset
 from gvpipe.io.simulation.file_times import TOLD, file_times
+from gvpipe.io.simulation.fill_values import fill_notes
 from gvpipe.io.simulation.frame_loader import dataset_loader
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.steps import read_steps
@@ -104,7 +105,7 @@ def read_listed(
         {**first.attributes, **columns.attributes},
         str(path),
         frames.origin,
-        (*notes, *first.notes, *columns.notes, *timing.notes),
+        (*notes, *first.notes, *columns.notes, *timing.notes, *fill_notes(columns.attributes, columns.fields)),
         columns.fields,
         first.parts,
         first.polygons,

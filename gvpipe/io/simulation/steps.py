@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from gvpipe.asset.attribute import Attribute
@@ -16,7 +17,8 @@ from gvpipe.io.damage import reading
 from gvpipe.io.mesh import too_wide
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import block_parts, surface_values
-from gvpipe.io.simulation.step_frames import StepColumn, StepFrames, Steps, is_still
+from gvpipe.io.simulation.fill_values import fill_notes
+from gvpipe.io.simulation.step_frames import StepColumn, StepFrames, Steps, is_still, sampled_frames
 from gvpipe.io.simulation.times import empty_note, time_steps
 from gvpipe.io.simulation.volumes import read_volume
 from gvpipe.model.sequence import MeshSequence
@@ -52,7 +54,7 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
         attributes,
         str(path),
         frames.origin,
-        (*notes, *frames.first.notes, *timing.notes),
+        (*notes, *frames.first.notes, *timing.notes, *fill_notes(attributes, fields)),
         fields,
         block_parts(frames.first, frames.surface),
         frames.surface.polygons,
@@ -89,10 +91,9 @@ def _split(frames: StepFrames, where: str) -> tuple[dict[str, Attribute], dict[s
 
 
 def _late_names(frames: StepFrames) -> list[str]:
-    """Numbers that the first frame lacks and the last has."""
-    try:
-        last = frames.open(frames.shape[0] - 1)
-        names = surface_values(last, frames.surface)
-    except InputError:  # which whoever asks for that frame gets
-        return []
-    return [f"{name} of later frames" for name in sorted(set(names) - set(frames.values))]
+    """Numbers that the first frame lacks and one of some others has."""
+    names: set[str] = set()
+    for frame in sampled_frames(frames):
+        with contextlib.suppress(InputError):  # which whoever asks for that frame gets
+            names |= set(surface_values(frames.open(frame), frames.surface))
+    return [f"{name} of later frames" for name in sorted(names - set(frames.values))]

@@ -57,9 +57,10 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None, real_tim
     mean = float(times[-1] - start) / (n_frames - 1)
     exact = tuple(times.tolist())
     if not (steps > 0).all() or not SLOWEST <= 1 / mean <= FASTEST:
-        why = "do not rise" if not (steps > 0).all() else f"are {mean:.3g} s apart"
-        rate = fps or (WATCHED if (steps > 0).all() and not real_time else DEFAULT_FPS)
-        return Timing(rate, start, exact, (f"the steps' times {why}; frames are {rate:g} a second, the times are kept",))
+        rising = bool((steps > 0).all())
+        why = f"the steps' times are {mean:.3g} s apart" if rising else f"the steps' times do not rise ({_where(times, steps)})"
+        rate = fps or (WATCHED if rising and not real_time else DEFAULT_FPS)
+        return Timing(rate, start, exact, (f"{why}; frames are {rate:g} a second, the times are kept",))
     is_shown = real_time or SLOWEST_SHOWN <= 1 / mean <= FASTEST_SHOWN
     rate = fps or (_whole(1 / mean) if is_shown else WATCHED)
     follow = np.allclose(start + np.arange(n_frames) / rate, times, rtol=ROUNDING, atol=ROUNDING * mean)
@@ -76,6 +77,12 @@ def time_steps(times: Float64 | None, n_frames: int, fps: float | None, real_tim
         "the times are kept",
     )  # fmt: skip
     return Timing(rate, start, kept, said)
+
+
+def _where(times: Float64, steps: Float64) -> str:
+    """The first frame that is not behind the one before."""
+    at = int(np.flatnonzero(~(steps > 0))[0]) + 1
+    return f"frame {at - 1} is at {times[at - 1]:.9g} s, frame {at} at {times[at]:.9g} s"
 
 
 def _whole(rate: float) -> float:

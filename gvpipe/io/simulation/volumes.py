@@ -10,6 +10,7 @@ import numpy as np
 
 from gvpipe.asset.field import Field
 from gvpipe.foundation.arrays import Bool, Float32, Float64, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.grids.cells import HIGHER_ORDER, VOLUMES, Cells
 from gvpipe.grids.volume import Volume
 from gvpipe.io.formats import BY_MESHIO
@@ -42,7 +43,11 @@ class FileSteps:
 
 
 class InnerPoints:
-    """Points that the surface has not, ``(F, I, 3) float32`` model units, relative to the surface's origin."""
+    """Points that the surface has not, ``(F, I, 3) float32`` model units, relative to the surface's origin.
+
+    Raises:
+        InputError: when sliced: a frame cannot be read, or a coordinate is not finite.
+    """
 
     def __init__(self, frames: StepFrames, rows: Int64) -> None:
         self._frames, self._rows = frames, rows
@@ -52,7 +57,14 @@ class InnerPoints:
         frames = range(*key.indices(self.shape[0]))
         block = np.empty((len(frames), *self.shape[1:]), np.float32)
         for i, frame in enumerate(frames):
-            block[i] = narrow(self._frames.points(frame)[None, self._rows], self._frames.origin)[0]
+            exact = self._frames.points(frame)[None, self._rows]
+            block[i] = narrow(exact, self._frames.origin)[0]
+            bad = np.flatnonzero(~np.isfinite(block[i]).all(axis=1))
+            if len(bad):
+                raise InputError(
+                    f"{self._frames.path}: frame {frame}, point {self._rows[bad[0]]} inside is {exact[0, bad[0]].tolist()}; "
+                    "every coordinate must be a finite number that float32 can hold"
+                )
         return block
 
 

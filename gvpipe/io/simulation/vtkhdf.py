@@ -16,9 +16,10 @@ from gvpipe.foundation.arrays import Array, Float64, Floats, Int64
 from gvpipe.grids.cells import Cells, join_cells
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
-from gvpipe.io.simulation.blocks import join_blocks
+from gvpipe.io.simulation.blocks import MOST_DEPTH, join_blocks
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.hdf import HdfFile, open_hdf
+from gvpipe.io.simulation.part_numbers import with_blocks
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xml_grids import POLY_CELLS, ROLES, as_points
 from gvpipe.model.sequence import MeshSequence
@@ -26,6 +27,7 @@ from gvpipe.model.sequence import MeshSequence
 ROOT = "VTKHDF"
 KINDS = ("UnstructuredGrid", "PolyData")
 COLLECTIONS = ("PartitionedDataSetCollection", "MultiBlockDataSet")
+ASSEMBLY = "Assembly"  # the group of links to the blocks of a multi-block file
 MAX_BLOCKS = 10_000
 UNIT = "Units"  # attribute of an array; gvpipe's own
 LONGEST_UNIT = 100  # characters
@@ -54,25 +56,62 @@ class BlockSteps:
     """The time steps of a file of several blocks, each a group of its own; raises `ValueError` for what it is not."""
 
     def __init__(self, file: HdfFile) -> None:
-        kinds = {name: file.attribute(f"{ROOT}/{name}", "Type") for name in file.names(ROOT)}
-        names = [name for name, kind in kinds.items() if kind in KINDS]
-        self._left = tuple(f"block {name!r} of {kind}" for name, kind in kinds.items() if kind and kind not in KINDS)
-        if not names:
+        listed = _listed(file)
+        named = [(name, path) for name, path, kind in listed if kind in KINDS]
+        self._left = tuple(f"block {name!r} of {kind}" for name, _, kind in listed if kind not in KINDS)
+        if not named:
             raise ValueError("it has no block of PolyData or UnstructuredGrid")
-        if len(names) > MAX_BLOCKS:
-            raise ValueError(f"it has {len(names)} blocks; at most {MAX_BLOCKS} are read")
-        self._blocks = {name: VtkHdfSteps(file, f"{ROOT}/{name}") for name in names}
-        moving = {name: each for name, each in self._blocks.items() if each.times is not None}
-        self.times: Float64 | None = next((each.times for each in moving.values()), None)
-        self.n_steps = next((each.n_steps for each in moving.values()), 1)
-        for name, each in moving.items():
+        if len(named) > MAX_BLOCKS:
+            raise ValueError(f"it has {len(named)} blocks; at most {MAX_BLOCKS} are read")
+        self._blocks = [(name, VtkHdfSteps(file, path)) for name, path in named]
+        moving = [(name, each) for name, each in self._blocks if each.times is not None]
+        self.times: Float64 | None = next((each.times for _, each in moving), None)
+        self.n_steps = next((each.n_steps for _, each in moving), 1)
+        for name, each in moving:
             if each.n_steps != self.n_steps:
                 raise ValueError(f"block {name!r} has {each.n_steps} time steps, another has {self.n_steps}")
 
     def open(self, step: int) -> Dataset:
         """A step of all blocks; one that has no time steps is the same in all."""
-        joined = join_blocks([(name, each.open(min(step, each.n_steps - 1))) for name, each in self._blocks.items()])
+        joined = join_blocks([(name, each.open(min(step, each.n_steps - 1))) for name, each in self._blocks])
         return replace(joined, not_carried=(*joined.not_carried, *self._left))
+
+
+def _listed(file: HdfFile) -> list[tuple[str, str, str]]:
+    """Name, path and kind of each block, in the order of their ``Index``.
+
+    A multi-block file has the names of its blocks, and their order, as links in its group ``Assembly``.
+    """
+    own = [(name, f"{ROOT}/{name}") for name in file.names(ROOT)]
+    own.sort(key=lambda each: _index(file, each[1]))
+    if file.attribute(ROOT, "Type") == "MultiBlockDataSet":
+        linked = _links(file, f"{ROOT}/{ASSEMBLY}")
+        known = {path.strip("/") for _, path in linked}
+        own = [*linked, *(each for each in own if each[1] not in known)]
+    listed = [(name, path, file.attribute(path, "Type")) for name, path in own]
+    return [each for each in listed if each[2]]
+
+
+def _links(file: HdfFile, path: str) -> list[tuple[str, str]]:
+    """Names and paths of the data sets below a group of an assembly."""
+    found, waiting, n_met = [], [("", path)], 0
+    while waiting:
+        name, target = waiting.pop()
+        n_met += 1
+        if target.count("/") > MOST_DEPTH:
+            raise ValueError(f"its blocks are nested more than {MOST_DEPTH} deep")
+        if n_met > MAX_BLOCKS:
+            raise ValueError(f"its assembly has more than {MAX_BLOCKS} links; at most {MAX_BLOCKS} are read")
+        if name and (file.attribute(target, "Type") or not target.startswith(f"{path}/")):
+            found.append((name, target))
+        else:
+            waiting += reversed(file.links(target))
+    return found
+
+
+def _index(file: HdfFile, path: str) -> int:
+    text = file.attribute(path, "Index")
+    return int(text) if text.isdigit() else 0
 
 
 class VtkHdfSteps:
@@ -100,6 +139,9 @@ class VtkHdfSteps:
             raise ValueError(f"it has {self.n_steps} time steps; at most {MAX_STEPS} are read")
         self._points_of_part = self._sizes("NumberOfPoints")
         self._known: tuple[tuple[int, ...], Cells] | None = None
+        self._whole = file.names(f"{root}/FieldData")
+        named = [name for name in self._whole if not file.has_numbers(f"{root}/FieldData/{name}")]
+        self._names = {name: partial(file.texts, f"{root}/FieldData/{name}") for name in named}
         groups = [f"{root}/{group}" for group in ("PointData", "CellData")]
         self._texts = [
             text_array(name) for group in groups for name in file.names(group) if not file.has_numbers(f"{group}/{name}")
@@ -112,13 +154,14 @@ class VtkHdfSteps:
         n_points = int(sizes.sum())
         start = self._offset("PointOffsets", step, int(self._points_of_part[:first].sum()))
         cells = self._cells(step, first, stop)
-        return Dataset(
+        made = Dataset(
             partial(self._points, start, n_points),
             lambda: cells,
             self._data("PointData", step, start, n_points),
             self._data("CellData", step, self._first_cell(step, first), len(cells.types)),
-            not_carried=(*map(field_data, self._file.names(f"{self._root}/FieldData")), *self._texts),
+            not_carried=(*map(field_data, self._whole), *self._texts),
         )
+        return with_blocks(made, self._names)
 
     def _sizes(self, name: str) -> Int64:
         held = self._tables.get(name)

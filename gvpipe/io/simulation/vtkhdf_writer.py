@@ -1,7 +1,11 @@
 """A sequence as one temporal VTKHDF file of poly data, or of an unstructured grid if it has a volume, frames by and by.
 
-Points and fields of all frames stand one after the other, and `Steps` says where each frame starts. Polygons and attributes are
-there once: all frames start at 0. Source: Kitware, VTK file formats, "VTKHDF file format", version 2.3.
+- Points and fields of all frames stand one after the other, and `Steps` says where each frame starts. Polygons and attributes
+  are there once: all frames start at 0.
+- Parts with vertices of their own are blocks, with links to them in `Assembly`. Other parts are numbers of cells
+  (`gvpipe.io.simulation.part_numbers`).
+
+Source: Kitware, VTK file formats, "VTKHDF file format", version 2.3.
 """
 
 from __future__ import annotations
@@ -17,7 +21,8 @@ from gvpipe.io.losses import renamed_note
 from gvpipe.io.simulation.grid_content import grid_content, grid_sequence, inside_notes
 from gvpipe.io.simulation.hdf import import_h5py
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
-from gvpipe.io.simulation.vtkhdf import POLY_GROUPS, ROOT, UNIT
+from gvpipe.io.simulation.vtkhdf import ASSEMBLY, POLY_GROUPS, ROOT, UNIT
+from gvpipe.io.simulation.vtkhdf_blocks import Block, find_blocks, own_blocks
 from gvpipe.model.sequence import MeshSequence
 
 VERSION = (2, 3)
@@ -45,36 +50,46 @@ def write_vtkhdf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
 def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]:
     """The same in this process; a file that cannot be written is left as it is."""
     h5py = import_h5py(str(path))
-    content = poly_content(sequence, "VTKHDF", has_units=True)
+    named = own_blocks(sequence.parts, sequence.n_vertices)
+    content = poly_content(sequence, "VTKHDF", has_units=True, parts="blocks" if named else "numbers")
+    blocks = find_blocks(sequence, content)
     with h5py.File(path, "w") as file:
-        root = file.create_group(ROOT)
-        root.attrs["Version"] = np.array(VERSION, np.int64)
-        root.attrs["Type"] = np.bytes_("PolyData")
-        root["NumberOfPoints"] = np.array([sequence.n_vertices], np.int64)
-        _write_polygons(root, content)
-        _write_steps(root, sequence, content)
-        _write_frames(root, sequence, content)
-    names = {name: _safe(name) for name in (*content.attributes, *content.fields)}
-    return (*content.notes, *renamed_note(names.items(), "VTKHDF"))
+        root = _start_set(file, ROOT, "MultiBlockDataSet" if named else "PolyData")
+        for number, block in enumerate(blocks):
+            group = _start_set(root, block.path, "PolyData") if named else root
+            group["NumberOfPoints"] = np.array([block.vertices.stop - block.vertices.start], np.int64)
+            _write_polygons(group, content, block)
+            _write_steps(group, sequence, content, block)
+            _write_texts(h5py, group, content, sequence.n_frames)
+            _write_still(group, content, block)
+            if named:
+                group.attrs["Index"] = np.int64(number)
+        if named:
+            assembly = root.create_group(ASSEMBLY, track_order=True)  # VTK reads blocks in the order of their links
+            for block, own in zip(blocks, named, strict=True):
+                assembly[own] = h5py.SoftLink(f"/{block.path}")
+        _write_frames(file, sequence, content, blocks)
+    changed = {name: _safe(name) for name in (*content.attributes, *content.fields)}
+    names = [(part.name, own) for part, own in zip(sequence.parts, named, strict=False)]
+    return (*content.notes, *renamed_note([*names, *changed.items()], "VTKHDF"))
 
 
 def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]:
     """The same of a sequence that `grid_sequence` made: an unstructured grid."""
     h5py = import_h5py(str(path))
-    content, n_frames = grid_content(sequence, "VTKHDF", has_units=True), sequence.n_frames
+    content, n_frames = grid_content(sequence, "VTKHDF", has_units=True, parts="numbers"), sequence.n_frames
     cells, is_far = content.cells, bool(sequence.origin.any())
     rows = {"vertex": sequence.n_vertices, "triangle": len(cells.types)}
     with h5py.File(path, "w") as file:
-        root = file.create_group(ROOT)
-        root.attrs["Version"] = np.array(VERSION, np.int64)
-        root.attrs["Type"] = np.bytes_("UnstructuredGrid")
+        root = _start_set(file, ROOT, "UnstructuredGrid")
         for key, count in zip(SIZES, (sequence.n_vertices, len(cells.types), len(cells.nodes)), strict=True):
             root[key] = np.array([count], np.int64)
         for key, values in (("Types", cells.types), ("Offsets", cells.offsets), ("Connectivity", cells.nodes)):
             _dataset(root, key, values.shape, values.dtype)[...] = values
-        steps = _start_steps(root, sequence)
+        steps = _start_steps(root, sequence, sequence.n_vertices)
         for key in ("CellOffsets", "ConnectivityIdOffsets"):
             steps[key] = np.zeros(n_frames, np.int64)
+        _write_texts(h5py, root, content.surface, n_frames)
         points = _dataset(root, "Points", (n_frames * rows["vertex"], 3), np.dtype("f8" if is_far else "f4"))
         targets = []
         for group_name, domain in GROUPS:
@@ -100,32 +115,41 @@ def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str,
     return (*content.notes, *renamed_note(names, "VTKHDF"))
 
 
-def _write_polygons(root: Any, content: PolyContent) -> None:
+def _start_set(above: Any, path: str, kind: str) -> Any:
+    group = above.create_group(f"/{path}", track_order=True)  # VTK lists blocks in the order in which they were made
+    group.attrs["Version"] = np.array(VERSION, np.int64)
+    group.attrs["Type"] = np.bytes_(kind)
+    return group
+
+
+def _write_polygons(root: Any, content: PolyContent, block: Block) -> None:
+    offsets = content.offsets[block.polygons.start : block.polygons.stop + 1]
+    nodes = content.nodes[offsets[0] : offsets[-1]] - block.vertices.start
     for name in POLY_GROUPS:
         group = root.create_group(name)
         held = name == "Polygons"
-        group["NumberOfCells"] = np.array([len(content.first) if held else 0], np.int64)
-        group["NumberOfConnectivityIds"] = np.array([len(content.nodes) if held else 0], np.int64)
-        group["Offsets"] = content.offsets if held else np.zeros(1, np.int64)
-        group["Connectivity"] = content.nodes if held else np.zeros(0, np.int64)
+        group["NumberOfCells"] = np.array([len(offsets) - 1 if held else 0], np.int64)
+        group["NumberOfConnectivityIds"] = np.array([len(nodes) if held else 0], np.int64)
+        group["Offsets"] = offsets - offsets[0] if held else np.zeros(1, np.int64)
+        group["Connectivity"] = nodes if held else np.zeros(0, np.int64)
 
 
-def _write_steps(root: Any, sequence: MeshSequence, content: PolyContent) -> None:
+def _write_steps(root: Any, sequence: MeshSequence, content: PolyContent, block: Block) -> None:
     n_frames = sequence.n_frames
     frames: Int64 = np.arange(n_frames)
-    steps = _start_steps(root, sequence)
+    steps = _start_steps(root, sequence, block.vertices.stop - block.vertices.start)
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((n_frames, len(POLY_GROUPS)), np.int64)
     for group, domain in GROUPS:
         offsets = steps.create_group(f"{group}Offsets")
-        rows = sequence.n_vertices if domain == "vertex" else len(content.first)
+        rows = block.rows(domain)
         for name in content.still(domain):
             offsets[_safe(name)] = np.zeros(n_frames, np.int64)
         for name in content.moving(domain):
-            offsets[_safe(name)] = frames * rows
+            offsets[_safe(name)] = frames * (rows.stop - rows.start)
 
 
-def _start_steps(root: Any, sequence: MeshSequence) -> Any:
+def _start_steps(root: Any, sequence: MeshSequence, n_vertices: int) -> Any:
     """The group of steps with what does not depend on cells."""
     n_frames = sequence.n_frames
     steps = root.create_group("Steps")
@@ -133,7 +157,7 @@ def _start_steps(root: Any, sequence: MeshSequence) -> Any:
     steps["Values"] = sequence.times
     steps["PartOffsets"] = np.zeros(n_frames, np.int64)
     steps["NumberOfParts"] = np.ones(n_frames, np.int64)
-    steps["PointOffsets"] = np.arange(n_frames) * sequence.n_vertices
+    steps["PointOffsets"] = np.arange(n_frames) * n_vertices
     return steps
 
 
@@ -143,33 +167,57 @@ def _write_roles(group: Any, content: PolyContent, domain: str) -> None:
             group.attrs[role] = np.bytes_(_safe(content.role(domain, kind)))
 
 
-def _write_frames(root: Any, sequence: MeshSequence, content: PolyContent) -> None:
-    is_far = bool(sequence.origin.any())
-    points = _dataset(root, "Points", (sequence.n_frames * sequence.n_vertices, 3), np.dtype("f8" if is_far else "f4"))
-    targets: dict[str, Any] = {}
+def _write_texts(h5py: Any, root: Any, content: PolyContent, n_frames: int) -> None:
+    """Names of parts as field data, which are the same in all steps: each starts at 0, with the components and rows of all."""
+    for name, texts in content.texts.items():
+        kind = h5py.string_dtype("ascii")  # of UTF-8 all the same: VTK reads texts of this type alone
+        root.create_dataset(f"FieldData/{name}", data=[text.encode() for text in texts], dtype=kind)
+        root[f"Steps/FieldDataOffsets/{name}"] = np.zeros(n_frames, np.int64)
+        root[f"Steps/FieldDataSizes/{name}"] = np.tile(np.array([1, len(texts)], np.int64), (n_frames, 1))
+
+
+def _write_still(root: Any, content: PolyContent, block: Block) -> None:
+    """Groups of numbers, and those that stand still."""
     for group_name, domain in GROUPS:
         group = root.create_group(group_name)
-        n_rows = sequence.n_vertices if domain == "vertex" else len(content.first)
         _write_roles(group, content, domain)
         for name, values in content.still(domain).items():
-            held = _dataset(group, _safe(name), _plain(values).shape, values.dtype)
-            held[...] = _plain(values)
+            own = _plain(values[block.rows(domain)])
+            held = _dataset(group, _safe(name), own.shape, own.dtype)
+            held[...] = own
             _write_unit(held, content.attributes[name].unit)
-        for name, one in content.moving(domain).items():
-            shape = (sequence.n_frames * n_rows, one.n_components)
-            targets[name] = _dataset(group, _safe(name), shape if one.n_components > 1 else shape[:1], one.dtype)
-            _write_unit(targets[name], one.unit)
+
+
+def _write_frames(file: Any, sequence: MeshSequence, content: PolyContent, blocks: list[Block]) -> None:
+    """Points and fields of all blocks; each frame is read once."""
+    is_far = bool(sequence.origin.any())
+    group_of = {domain: name for name, domain in GROUPS}
     for start, stop in sequence.spans():
-        block = sequence.read_absolute(start, stop) if is_far else sequence.read(start, stop)
-        points[start * sequence.n_vertices : stop * sequence.n_vertices] = block.reshape(-1, 3)
-        for name, target in targets.items():
-            rows = content.rows(content.fields[name], content.fields[name].read(start, stop))
-            n_rows = rows.shape[1]
-            target[start * n_rows : stop * n_rows] = rows.reshape(-1, *target.shape[1:])
+        points = sequence.read_absolute(start, stop) if is_far else sequence.read(start, stop)
+        for block in blocks:
+            _put(file, f"{block.path}/Points", start, points[:, block.vertices], sequence.n_frames)
+        for name, one in content.fields.items():
+            rows = content.rows(one, one.read(start, stop))
+            for block in blocks:
+                place = f"{block.path}/{group_of[one.domain]}/{_safe(name)}"
+                _put(file, place, start, rows[:, block.rows(one.domain)], sequence.n_frames, one.unit)
 
 
-def _dataset(group: Any, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
-    chunk = (min(CHUNK, max(shape[0], 1)), *shape[1:])
+def _put(file: Any, place: str, start: int, values: Array, n_frames: int, unit: str = "") -> None:
+    """Write frames ``(n, R, C)`` from one on. The first makes the dataset, in chunks of as many frames.
+
+    A dataset is closed behind each: an open one keeps a chunk in memory, and there may be many parts.
+    """
+    n_rows, width = values.shape[1:]
+    shape = (n_frames * n_rows, width) if width > 1 else (n_frames * n_rows,)
+    if start == 0:
+        _write_unit(_dataset(file, place, shape, values.dtype, len(values) * n_rows), unit)
+    file[place][start * n_rows : (start + len(values)) * n_rows] = values.reshape(-1, *shape[1:])
+
+
+def _dataset(group: Any, name: str, shape: tuple[int, ...], dtype: np.dtype[Any], n_together: int = CHUNK) -> Any:
+    """A compressed dataset; ``n_together`` rows are written at a time."""
+    chunk = (min(CHUNK, max(min(shape[0], n_together), 1)), *shape[1:])
     return group.create_dataset(name, shape, dtype, chunks=chunk, compression="gzip", compression_opts=4, shuffle=True)
 
 

@@ -7,7 +7,7 @@ sequence has an origin, which is added; else float32.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -42,10 +42,23 @@ class Appended:
         self._size += len(packed)
         return element
 
+    def texts(self, named: Mapping[str, Sequence[str]]) -> str:
+        """The element ``FieldData`` with texts by name, ``""`` if there are none; each text ends with a zero."""
+        elements = []
+        for name, texts in named.items():
+            packed = _packed(b"".join(text.encode() + b"\0" for text in texts))
+            elements.append(
+                f'<Array type="String" Name={quoteattr(name)} NumberOfTuples="{len(texts)}" format="appended" '
+                f'offset="{self._size}"/>'
+            )
+            self.data.append(packed)
+            self._size += len(packed)
+        return f"<FieldData>{''.join(elements)}</FieldData>" if elements else ""
+
 
 def encode_vtp(sequence: MeshSequence, name: str) -> FrameEncoder:
     """Return how the frames of a sequence become .vtp files."""
-    content = poly_content(sequence, "VTP")
+    content = poly_content(sequence, "VTP", parts="numbers")
     origin = sequence.origin
 
     def encode(positions: Float32, fields: Mapping[str, Array]) -> bytes:
@@ -73,7 +86,8 @@ def vtp_bytes(content: PolyContent, points: Array, fields: Mapping[str, Array]) 
     sizes = f'NumberOfPoints="{len(points)}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0"'
     head = (
         '<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
-        f'compressor="vtkZLibDataCompressor"><PolyData><Piece {sizes} NumberOfPolys="{len(content.first)}">'
+        f'compressor="vtkZLibDataCompressor"><PolyData>{appended.texts(content.texts)}'
+        f'<Piece {sizes} NumberOfPolys="{len(content.first)}">'
         f"{groups[0]}{groups[1]}<Points>{place}</Points><Polys>{polys}</Polys></Piece></PolyData>"
         '<AppendedData encoding="raw">_'
     )

@@ -47,7 +47,7 @@ def write_grids(sequence: MeshSequence, place: Callable[[int], Path]) -> tuple[s
     lost: tuple[str, ...] = ()
     if sequence.volume is not None:
         sequence, lost = grid_sequence(sequence, sequence.volume)
-    content = grid_content(sequence, "VTU", lost)
+    content = grid_content(sequence, "VTU", lost, parts="numbers")
     is_far = bool(sequence.origin.any())
     for start, stop in sequence.spans():
         block = sequence.read_absolute(start, stop) if is_far else sequence.read(start, stop)
@@ -73,6 +73,7 @@ def _vtu(content: GridContent, points: Array, frame: int) -> bytes:
     head = (
         '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
         'header_type="UInt64" compressor="vtkZLibDataCompressor"><UnstructuredGrid>'
+        f"{appended.texts(content.surface.texts)}"
         f'<Piece NumberOfPoints={quoteattr(str(len(points)))} NumberOfCells="{len(content.cells.types)}">'
         f"{groups[0]}{groups[1]}<Points>{place}</Points><Cells>{cells}</Cells></Piece></UnstructuredGrid>"
         '<AppendedData encoding="raw">_'

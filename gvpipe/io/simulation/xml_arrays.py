@@ -101,6 +101,16 @@ def read_array(file: VtkXml, element: ElementTree.Element, n_rows: int | None = 
     return values.reshape(-1, width) if width > 1 else values
 
 
+def read_texts(file: VtkXml, element: ElementTree.Element) -> list[str]:
+    """Decode an ``Array`` of texts, each of which ends with a zero; raises `ValueError`."""
+    name, form = element.get("Name", "an array"), element.get("format", "ascii")
+    if form == "ascii":
+        data = bytes(int(word) & 255 for word in (element.text or "").split())  # VTK writes signed bytes
+    else:
+        data = _decode(file, element, form, name)
+    return [text.decode("utf-8", "replace") for text in data.split(b"\0")[:-1]]
+
+
 def _split_appended(data: bytes) -> tuple[bytes, bytes, bool]:
     """The XML without its appended bytes, those bytes, and whether they are raw."""
     at = data.find(b"<AppendedData")

@@ -17,8 +17,9 @@ from gvpipe.grids.cells import Cells, join_cells, structured_cells
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, join_arrays, text_array
 from gvpipe.io.simulation.limits import check_bytes
+from gvpipe.io.simulation.part_numbers import with_blocks
 from gvpipe.io.simulation.side_files import side_file
-from gvpipe.io.simulation.xml_arrays import TYPES, VtkXml, parse_vtk_xml, read_array
+from gvpipe.io.simulation.xml_arrays import TYPES, VtkXml, parse_vtk_xml, read_array, read_texts
 
 KINDS = ("PolyData", "UnstructuredGrid", "StructuredGrid", "RectilinearGrid", "ImageData")
 PARALLEL = tuple(f"P{kind}" for kind in KINDS[:2])
@@ -38,7 +39,7 @@ def load_xml_grid(path: Path) -> Dataset:
         raise ValueError("it has no pieces; a mesh is needed")
     pieces = [_open_piece(*source) for source in sources]
     if len(pieces) == 1:
-        return pieces[0]
+        return with_blocks(pieces[0], _texts(sources[0][0]))
     starts: list[int] = []
 
     def cells() -> Cells:
@@ -98,6 +99,12 @@ def _open_piece(file: VtkXml, piece: ElementTree.Element) -> Dataset:
     left.add_all((*skipped, *more))
     left.add_all(field_data(each.get("Name") or "unnamed") for each in file.root.findall(f"{kind}/FieldData/*"))
     return Dataset(points, cells, point_data, cell_data, not_carried=left.names)
+
+
+def _texts(file: VtkXml) -> dict[str, Callable[[], list[str]]]:
+    """What reads the texts of the whole file, by name."""
+    found = file.root.findall(f"{file.root.get('type', '')}/FieldData/Array[@type='String']")
+    return {each.get("Name") or "unnamed": partial(read_texts, file, each) for each in found}
 
 
 def _count(piece: ElementTree.Element, name: str) -> int:
