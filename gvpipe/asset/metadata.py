@@ -58,10 +58,12 @@ class Metadata:
             return np.array(self.times)
         return np.asarray(self.start_time + np.arange(n_frames) / fps)
 
-    def of_frames(self, start: int, stop: int, n_frames: int) -> Metadata:
-        """The metadata of frames ``start`` to ``stop`` of ``n_frames``: with their times, where each has one of its own."""
-        if len(self.times) != n_frames or (start, stop) == (0, n_frames) or not 0 <= start < stop <= n_frames:
+    def of_frames(self, start: int, stop: int, n_frames: int, fps: float) -> Metadata:
+        """The metadata of frames ``start`` to ``stop`` of ``n_frames``: with their times."""
+        if (start, stop) == (0, n_frames) or not 0 <= start < stop <= n_frames or self == NO_METADATA:
             return self
+        if len(self.times) != n_frames:
+            return replace(self, start_time=self.start_time + start / fps)
         return replace(self, start_time=self.times[start], times=self.times[start:stop])
 
 

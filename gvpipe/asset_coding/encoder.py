@@ -85,6 +85,7 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
         SettingError: a bound is none, or names nothing of the sequence.
         InputError: a field holds infinite numbers, or NaN that is not to be kept; an image cannot be made smaller.
     """
+    options = _by_what_they_are(options, sequence)
     check_names(options.attributes, sequence.attributes, "attribute")
     check_names(options.fields, sequence.fields, "field")
     images = tuple(limit_image(image, options.textures) for image in sequence.images)
@@ -124,6 +125,20 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     return Plan(attributes, fields, images, tuple(left_out), tuple(whole))
 
 
+def _by_what_they_are(options: AssetOptions, sequence: MeshSequence) -> AssetOptions:
+    """Options by name: whether numbers stand still, and so are an attribute, need not be known."""
+    attributes, fields = dict(options.attributes), dict(options.fields)
+    ways = (
+        (fields, attributes, sequence.fields, sequence.attributes),
+        (attributes, fields, sequence.attributes, sequence.fields),
+    )
+    for given, others, own, their in ways:
+        for name in [*given]:
+            if name not in own and name in their and name not in others:
+                others[name] = given.pop(name)
+    return dataclasses.replace(options, attributes=attributes, fields=fields)
+
+
 class AssetCoder:
     """Codes one sequence's asset beside any of its bitstreams.
 
@@ -137,6 +152,7 @@ class AssetCoder:
 
     def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
         self._sequence = sequence
+        options = _by_what_they_are(options, sequence)
         self.plan = plan_asset(sequence, options)
         volume = sequence.volume
         kept = {**self.plan.attributes, **self.plan.fields}

@@ -66,9 +66,11 @@ def scan_field(name: str, given: Field, holes: bool, where: str, polygons: Int32
             bad = np.isinf(block) if holes else ~np.isfinite(block)
             if bad.any():
                 frame, row, _ = np.argwhere(bad)[0]
-                remedy = f"repair it, or keep holes by --field '{name}=0.1%,nan=keep'" if not holes else "repair it"
+                is_hole = not holes and not np.isinf(block[frame, row]).any()
+                remedy = f"repair it, or keep holes by --field '{name}=0.1%,nan=keep'" if is_hole else "repair it"
+                where_in = "inner point" if given.domain == "point" else given.domain
                 raise InputError(
-                    f"{where}: field {name!r}: frame {first + frame}, {given.domain} {row} is "
+                    f"{where}: field {name!r}: frame {first + frame}, {where_in} {row} is "
                     f"{block[frame, row].tolist()}; {remedy}"
                 )
         repeats.look_at(block)

@@ -18,7 +18,7 @@ def to_planes(rows: Int64) -> bytes:
     """``(n, k)`` numbers below 2^31 as planes."""
     differences = np.diff(rows, axis=0, prepend=0)
     zigzag = np.where(differences >= 0, 2 * differences, -2 * differences - 1).astype("<u4")
-    return np.ascontiguousarray(zigzag).view(np.uint8).reshape(len(rows), -1).T.tobytes()
+    return np.ascontiguousarray(zigzag).view(np.uint8).reshape(len(rows), 4 * rows.shape[1]).T.tobytes()
 
 
 def from_planes(planes: bytes, count: int) -> Int64:

@@ -66,6 +66,9 @@ def not_carried(names: Sequence[str]) -> tuple[str, ...]:
     return (f"the file does not carry {', '.join(names)}",) if names else ()
 
 
+NO_VOLUME = "there are no volume cells to keep"
+
+
 def left_behind(names: Sequence[str]) -> tuple[str, ...]:
     """The note for what a source has beside what is read."""
     shown = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")

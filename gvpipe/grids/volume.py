@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from gvpipe.asset.field import Field
-from gvpipe.foundation.arrays import Floats, Frames, Int64
+from gvpipe.foundation.arrays import Array, Floats, Frames, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.grids.cells import VOLUMES, Cells
 
@@ -38,6 +40,8 @@ class Volume:
     blocks: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.points, np.ndarray | _Points):
+            object.__setattr__(self, "points", _Points(self.points))
         if len(self.points.shape) != 3 or self.points.shape[2] != 3:
             raise InputError(f"a volume's points have shape {self.points.shape}; (frames, points, 3) is needed")
         strange = sorted(set(np.unique(self.cells.types).tolist()) - set(VOLUMES))
@@ -75,8 +79,35 @@ class Volume:
         def cut(fields: Mapping[str, Field]) -> dict[str, Field]:
             return {name: each if len(each) == 1 else each.part(start, stop) for name, each in fields.items()}
 
-        points = _Span(self.points, start, stop)
+        points = _Points(_Span(self.points, start, stop))
         return replace(self, points=points, point_fields=cut(self.point_fields), cell_fields=cut(self.cell_fields))
+
+
+class _Points:
+    """Frames that index as arrays do."""
+
+    def __init__(self, frames: Frames) -> None:
+        self._frames = frames
+        self.shape: tuple[int, ...] = tuple(frames.shape)
+        self.dtype = np.dtype(np.float32)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: int | slice, /) -> Floats:
+        if isinstance(key, slice):
+            start, stop, step = key.indices(len(self))
+            if step == 1:
+                return self._frames[start : max(start, stop)]
+            return np.stack([self[k] for k in range(start, stop, step)])
+        index = operator.index(key)
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"frame {index} of a volume: there are {len(self)}")
+        frame: Floats = self._frames[index % len(self) : index % len(self) + 1][0]
+        return frame
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.asarray(self._frames[0 : len(self)], dtype)
 
 
 class _Span:

@@ -59,9 +59,11 @@ def read(
         sequence = read_stored(path, lambda copy: _read(copy, options))
     else:
         sequence = _read(path, options)
-    from gvpipe.foundation.notes import left_behind
+    from gvpipe.foundation.notes import NO_VOLUME, left_behind
     from gvpipe.model.warp import warp_hint
 
+    if volume and sequence.volume is None:
+        sequence = replace(sequence, notes=(*sequence.notes, NO_VOLUME))
     said = (*cut_notes(sequence.images), *warp_hint(sequence), *left_behind(sequence.not_carried))
     return replace(sequence, notes=(*sequence.notes, *said)) if said else sequence
 

@@ -286,7 +286,7 @@ class MeshSequence:
         size = stop - start, self.n_vertices
         exact = None if self._exact is None else Span(self.read_absolute, start, *size)
         fields = {name: each.part(start, stop) for name, each in self.fields.items()}
-        metadata = self.metadata.of_frames(start, stop, self.n_frames)
+        metadata = self.metadata.of_frames(start, stop, self.n_frames, self.fps)
         volume = None if self.volume is None else self.volume.part(start, stop)
         return self._derived(Span(self.read, start, *size), exact, fields=fields, metadata=metadata, volume=volume)
 

@@ -6,6 +6,7 @@ so the section of a grid is filled, with the numbers of its points or cells.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.grids.cells import VOLUMES, Cells
 
 FORM = re.compile(r"(-?)([xyz])=([-+0-9.eE]+)(%?)")
+MEANT = re.compile(r"-?[a-z]=.*")
 AXES = "xyz"
 
 
@@ -60,14 +62,16 @@ def parse_cut(text: str) -> Cut:
             raise ValueError(text)
         sign, axis, number, percent = found.groups()
         place = float(number)
+        if not math.isfinite(place):
+            raise ValueError(text)
     except ValueError as exc:
         raise InputError(f"a plane {text!r}; x=0.3, y=30% or -z=0.3 is needed") from exc
     return Cut(AXES.index(axis), place / 100 if percent else place, bool(percent), -1 if sign else 1)
 
 
 def is_cut(text: str | None) -> bool:
-    """Whether a text has the form of a plane."""
-    return text is not None and FORM.fullmatch(text) is not None
+    """Whether a text is meant as a plane, as ``-y=`` is, too."""
+    return text is not None and MEANT.fullmatch(text) is not None
 
 
 class Piece(NamedTuple):

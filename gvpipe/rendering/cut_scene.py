@@ -47,7 +47,8 @@ class CutScene:
         """
         points, faces, values = self.mesh(frame)
         if not len(faces):
-            at = f"{AXES[self._cut.axis]}={self._cut.place:g}{' of the box' if self._cut.is_part else ''}"
+            sign = "-" if self._cut.sign < 0 else ""
+            at = f"{sign}{AXES[self._cut.axis]}={self._cut.place:g}{' of the box' if self._cut.is_part else ''}"
             raise InputError(f"{self._sequence.name}: nothing of frame {frame} is left by the plane {at}; move it")
         look = self._look
         one = MeshSequence(points[None], faces, self._sequence.fps)

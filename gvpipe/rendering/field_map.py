@@ -45,15 +45,13 @@ class FieldMap:
         *,
         log: bool = False,
     ) -> None:
-        if name not in sequence.fields:
-            known = f"there are: {', '.join(sequence.fields)}" if sequence.fields else "there are none"
-            raise InputError(f"{sequence.name}: field {name!r} asked for; {known}{did_you_mean(name, sequence.fields)}")
-        self._field: Field = sequence.fields[name]
+        self._field = _field_of(sequence, name)
         self._name, self._log, self._ramp = name, log, colormap(colors)
         self.limits = self._limits_of(sequence, frames, limits)
 
     def numbers(self, frame: int) -> Float64:
         """``(R,)`` values, or magnitudes, of vertices or triangles; NaN where there is none."""
+        frame = min(frame, len(self._field) - 1)
         return _lengths(self._field.read(frame, frame + 1)[0].astype(np.float64))
 
     def values(self, frame: int) -> Float64:
@@ -115,3 +113,16 @@ class FieldMap:
 def _lengths(block: Float64) -> Float64:
     """Numbers ``(R, 1)`` as they are, lengths of vectors ``(R, C)``: ``(R,)``."""
     return np.asarray(block[:, 0] if block.shape[1] == 1 else np.linalg.norm(block, axis=1))
+
+
+def _field_of(sequence: MeshSequence, name: str) -> Field:
+    """The field of a name; static numbers of vertices or triangles are a field of one frame. Raises `InputError`."""
+    if name in sequence.fields:
+        found: Field = sequence.fields[name]
+        return found
+    still = {key: one for key, one in sequence.attributes.items() if one.domain in ("vertex", "triangle")}
+    if name in still:
+        return Field(np.asarray(still[name])[None], still[name].domain, unit=still[name].unit, name=f"attribute {name!r}")
+    names = [*sequence.fields, *still]
+    known = f"there are: {', '.join(names)}" if names else "there are none"
+    raise InputError(f"{sequence.name}: field {name!r} asked for; {known}{did_you_mean(name, names)}")

@@ -23,6 +23,7 @@ from gvpipe.io.simulation.poly_content import HeldParts, PolyContent, poly_conte
 from gvpipe.model.sequence import MeshSequence
 
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
+BEHIND = "flat cells come behind the volume cells"
 
 
 class _AllRows:
@@ -32,7 +33,7 @@ class _AllRows:
         self._parts = [each for each in (surface, inside) if each is not None]
         self._rows = rows
         self.shape: tuple[int, ...] = (n_frames, len(rows), *surface.shape[2:])
-        self.dtype: Any = getattr(surface, "dtype", np.dtype(np.float32))
+        self.dtype: Any = np.result_type(*(getattr(each, "dtype", np.float32) for each in self._parts))
 
     def __getitem__(self, key: slice, /) -> Array:
         start, stop, _ = key.indices(self.shape[0])
@@ -90,7 +91,8 @@ def grid_sequence(sequence: MeshSequence, volume: Volume) -> tuple[MeshSequence,
             continue
         surface: Any = _Still(np.asarray(one)) if isinstance(one, Attribute) else _Triple(one)
         parts = surface, None if inside is None else _Triple(inside)
-        if isinstance(one, Attribute) and (inside is None or len(inside) == 1):
+        is_still = inside is None or (len(inside) == 1 and inside.dtype != np.float64)
+        if isinstance(one, Attribute) and is_still:
             values = _AllRows(*parts, rows, 1)[0:1][0]
             attributes[name] = Attribute(values, "vertex", one.kind, unit=one.unit)
         else:
@@ -172,7 +174,10 @@ class GridContent:
 
     def dtype(self, domain: str, name: str) -> np.dtype[Any]:
         """Type of the numbers."""
-        return np.dtype(self.names(domain)[name].dtype)
+        own = self.names(domain)[name].dtype
+        if domain == "vertex" or self.volume is None:
+            return np.dtype(own)
+        return np.result_type(own, self.volume.cell_fields[name].dtype)
 
     def read(self, domain: str, name: str, start: int, stop: int) -> Array:
         """Numbers of all points, or of all cells, in some frames: ``(n, rows, C)``."""
@@ -217,9 +222,9 @@ def grid_content(
     inside = {} if volume is None else volume.cell_fields
     both: dict[str, Attribute | Field] = {**surface.attributes, **surface.fields}
     without = [name for name, one in both.items() if one.domain == "triangle" and volume is not None and name not in inside]
-    return GridContent(
-        cells, surface, sequence.n_vertices, flat, volume, (*surface.notes, *inside_notes(format_name, (*lost, *without)))
-    )
+    behind_them = (BEHIND,) if volume is not None and len(flat) else ()
+    said = (*surface.notes, *inside_notes(format_name, (*lost, *without)), *behind_them)
+    return GridContent(cells, surface, sequence.n_vertices, flat, volume, said)
 
 
 def _with_runs(surface: PolyContent, volume: Volume, sequence: MeshSequence, flat: Int64) -> tuple[PolyContent, Volume]:

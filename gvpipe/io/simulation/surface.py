@@ -90,6 +90,8 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
     number[used] = np.arange(len(used))
     faces = number[nodes][fan(counts)].astype(np.int32)
     left = _left_behind(cells, n_covered)
+    if solid:
+        left.add("points of no cell", len(points) - len(np.unique(cells.nodes)))
     without_inside = left.names
     _add_inside(left, cells, used)
     return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), left.names, without_inside)

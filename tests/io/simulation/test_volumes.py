@@ -320,3 +320,65 @@ def _unknown() -> Any:
     from gvpipe.asset_coding.directory import Listed
 
     return Listed("nothing", "scalar", "cell", 0, "float32", "", 0.1, 1, "volume.cell.2")
+
+
+@pytest.mark.parametrize("dimensions", [(2, 2, 2), (5, 2, 2)])
+def test_grids_without_inner_points(tmp_path: Path, dimensions: tuple[int, int, int]) -> None:
+    """A grid that is one cell thick has cells and no point inside."""
+    cells = structured_cells(dimensions)
+    z, y, x = np.meshgrid(*(np.arange(n) for n in dimensions[::-1]), indexing="ij")
+    points = np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(np.float32)
+    surface = extract_surface(cells, points)
+    volume = Volume(cells, np.zeros((2, 0, 3), np.float32))
+    given = gvpipe.MeshSequence(np.stack([points, points + 1]), surface.faces, 25, polygons=surface.polygons, volume=volume)
+    for reorder in (False, True):
+        gvpipe.encode(given, tmp_path / "a.mp4", "pca", reorder=reorder)
+        assert len(volume_of(gvpipe.read(tmp_path / "a.mp4")).cells.types) == len(cells.types)
+    gvpipe.write(gvpipe.read(tmp_path / "a.mp4"), tmp_path / "b.pvd")
+    assert volume_of(gvpipe.read(tmp_path / "b.pvd", volume=True)).n_points == 0
+
+
+def test_numbers_that_are_still_on_the_surface_alone(tmp_path: Path, run: Any) -> None:
+    """They are an attribute there, move inside with more digits than float32 has, and come back within their bound."""
+    given = block()
+    volume = volume_of(given)
+    steps = np.arange(volume.n_points) * 1e-3 * np.arange(N_FRAMES)[:, None] + 101325.0
+    heat = gvpipe.Field(steps, "point")
+    assert heat.dtype == np.float64
+    attributes = {"heat": np.full(given.n_vertices, 101325, np.float32)}
+    given = replace(
+        given, attributes=attributes, fields={}, volume=replace(volume, point_fields={"heat": heat}, cell_fields={})
+    )
+    gvpipe.encode(given, tmp_path / "a.mp4", "pca", fields={"heat": 0.001})
+    assert run("decode", tmp_path / "a.mp4", tmp_path / "b.pvd").status == 0
+    found = volume_of(gvpipe.read(tmp_path / "b.pvd", volume=True)).point_fields["heat"]
+    assert np.abs(found[:] - steps).max() <= 0.001
+    gvpipe.render(tmp_path / "a.mp4", tmp_path / "a.png", field="heat", cut="x=50%", size=160)  # of an attribute
+
+
+def test_what_volumes_lose_is_said(tmp_path: Path) -> None:
+    nodes = SAMPLE["hexahedra"]((3, 3, 3))
+    frame = next(SAMPLE["frames"]((3, 3, 3), 1))
+    more = frame._replace(
+        points=np.concatenate([frame.points, [[9, 9, 9]]]),
+        temperature=np.append(frame.temperature, 1),
+        velocity=np.concatenate([frame.velocity, [[0, 0, 0]]]),
+    )
+    (tmp_path / "a.vtu").write_bytes(SAMPLE["vtu"](more, nodes))
+    assert "points of no cell" in gvpipe.read(tmp_path / "a.vtu", volume=True).not_carried
+    plain = gvpipe.read(tmp_path / "a.vtu", volume=True)
+    points: Any = volume_of(plain).points
+    assert np.array_equal(points[0], np.asarray(points)[0])
+    with pytest.raises(IndexError):
+        points[1]
+    gvpipe.write(gvpipe.read(ROOT / "samples" / "flag.npz").part(0, 1), tmp_path / "b.vtp")
+    assert "there are no volume cells to keep" in gvpipe.read(tmp_path / "b.vtp", volume=True).notes
+
+
+def test_times_of_parts_follow(tmp_path: Path, run: Any) -> None:
+    """Whichever way frames are chosen, they keep their times."""
+    source = write_block(tmp_path / "in.pvd")
+    assert gvpipe.read(source).part(2, 5).times.tolist() == [2, 3, 4]
+    for options in (("--start", "3"), ("--frames", "3:")):
+        assert run("convert", source, tmp_path / "out.pvd", *options).status == 0
+        assert gvpipe.read(tmp_path / "out.pvd").times.tolist() == [3, 4, 5]
