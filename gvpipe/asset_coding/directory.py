@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS
+from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS, Attribute
 from gvpipe.asset.field import DOMAINS as FIELD_DOMAINS
+from gvpipe.asset.field import Field
 from gvpipe.asset.material import Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
@@ -214,6 +215,21 @@ def _read_part(values: JsonObject, n_vertices: int, n_materials: int) -> Part:
         raise values.wrong("vertices", "a range")
     material = values.integer("material", 0, n_materials - 1) if "material" in values else None
     return Part(values.text("name"), (low, high), (0, 0), material, values.text("parent", ""))
+
+
+def entry_of(
+    name: str,
+    given: Attribute | Field,
+    components: int,
+    bound: float,
+    section: str,
+    span: tuple[float, float] | None = None,
+    coding: int = CODED,
+    reduced: Reduction | None = None,
+) -> Listed:
+    """The entry of an attribute or a field; arguments are as of `Listed`, ``span`` is its range."""
+    dtype = given.dtype.name if given.dtype != np.float64 else "float32"  # what is left of float64 behind an offset
+    return Listed(name, given.kind, given.domain, components, dtype, given.unit, bound, coding, section, span, reduced)
 
 
 def listed_values(listed: Listed) -> dict[str, Any]:

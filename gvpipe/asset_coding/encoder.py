@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.asset.attribute import Attribute
-from gvpipe.asset.field import Field
 from gvpipe.asset.listing import count_polygons
 from gvpipe.asset.material import Image, image_size
 from gvpipe.asset.metadata import NO_METADATA, Metadata, with_losses
@@ -30,17 +29,19 @@ from gvpipe.asset_coding.directory import (
     Directory,
     Listed,
     ListedImage,
+    entry_of,
     pack_directory,
     vertex_starts,
 )
+from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.reduction import NO_REDUCTION, Reduction
-from gvpipe.asset_coding.scan import WHOLE_KINDS, Scan, are_whole, longest_vector, scan_field
+from gvpipe.asset_coding.scan import WHOLE_KINDS, are_whole, longest_vector
 from gvpipe.asset_coding.times import SECTION as TIMES
 from gvpipe.asset_coding.times import pack_times
-from gvpipe.asset_coding.volume_encoder import VolumeCoder
+from gvpipe.asset_coding.volume_encoder import Shown, VolumeCoder
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
 from gvpipe.attributes.surface import Surface
@@ -54,7 +55,6 @@ from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.octahedral import angular_bound, to_octahedral
 from gvpipe.fields.values import FieldBound
 from gvpipe.foundation.arrays import Array, Int32, Int64
-from gvpipe.foundation.errors import InputError
 from gvpipe.model.sequence import MeshSequence
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
@@ -65,14 +65,14 @@ class Plan:
     """What is coded, and how finely: everything that does not depend on a bitstream.
 
     Args:
-        attributes, fields: by name, with their precision, and of fields what they are.
+        attributes, fields: by name, with their precision.
         images: as they go into the file.
         left_out: names of what a user asked to leave out.
         whole: names of floats that are kept exactly, since all are whole numbers and nobody asked otherwise.
     """
 
     attributes: dict[str, tuple[Attribute, Precision]]
-    fields: dict[str, tuple[Field, Precision, Scan]]
+    fields: dict[str, FieldPlan]
     images: tuple[Image, ...]
     left_out: tuple[str, ...]
     whole: tuple[str, ...] = ()
@@ -106,22 +106,12 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
             left_out.append(name)
     for name, field in sequence.fields.items():
         given = options.fields.get(name)
-        is_float = field.dtype.kind == "f"
-        holes = precision(given, field.kind, is_float, 1.0, texels, f"field {name!r}", vectors=(1, 1.0))
-        if not holes.is_kept:
+        plan, is_whole = plan_field(name, field, given, sequence.name, texels=texels, polygons=sequence.polygons)
+        whole += [name] if is_whole else []
+        if plan is None:
             left_out.append(name)
-            continue
-        scan = scan_field(name, field, holes.holes, sequence.name, sequence.polygons)
-        is_whole = scan.is_whole and scan.high > scan.low
-        vectors = (field.n_components, scan.longest)
-        found = precision(given, field.kind, is_float, scan.high - scan.low, texels, f"field {name!r}", is_whole, vectors)
-        whole += [name] if is_whole and given is None else []
-        if scan.rounding > found.bound / 2:
-            raise InputError(
-                f"{sequence.name}: field {name!r} is float64, and float32 rounds it by up to {scan.rounding:.2g} once "
-                f"{scan.reduction.offsets} is subtracted; give it a bound of {2 * scan.rounding:.2g} or more by --field"
-            )
-        fields[name] = field, found, scan
+        else:
+            fields[name] = plan
     return Plan(attributes, fields, images, tuple(left_out), tuple(whole))
 
 
@@ -193,10 +183,9 @@ class AssetCoder:
         attributes = self._add_attributes(sections, origins, surface)
         fields = self._add_fields(sections, origins, surface, arrangement.polygons, reader if is_final else None)
         if self._volume is not None:
-            shown, n_beside = (arrangement.faces, arrangement.polygons), sum(map(len, sections.values()))
+            shown = Shown(permutation, reader, arrangement.faces, arrangement.polygons)
             reorder = bool(getattr(codec, "reorder", False))
-            place_of = place.astype(np.int64)
-            sections |= self._volume.sections(permutation, place_of, reader, shown, n_beside, reorder, is_final)
+            sections |= self._volume.sections(shown, sum(map(len, sections.values())), reorder, is_final)
         metadata = _with_losses(self._sequence)
         if len(metadata.times) == encoded.bitstream.n_frames:
             sections[TIMES] = pack_times(metadata.times)
@@ -249,7 +238,7 @@ class AssetCoder:
             )
             if attribute.domain == "corner" and moved.indices is not None:
                 references.append(entries_of(moved.indices, surface))
-            listed.append(_listed(name, attribute, attribute.values.shape[1], found.bound, section))
+            listed.append(entry_of(name, attribute, attribute.values.shape[1], found.bound, section))
         return tuple(listed)
 
     def _add_fields(
@@ -261,20 +250,21 @@ class AssetCoder:
         reader: FrameReader | None,
     ) -> tuple[Listed, ...]:
         listed = []
-        for number, (name, (field, found, scan)) in enumerate(self.plan.fields.items()):
+        for number, (name, plan) in enumerate(self.plan.fields.items()):
+            field, found, scan = plan
             section = f"field.{number}"
             rows = origins.of(field.domain)
             assert rows is not None  # fields are on vertices or triangles
-            job = _FieldJob(name, field.select(rows), found, scan, surface, polygons)
+            job = _FieldJob(name, plan._replace(field=field.select(rows)), surface, polygons)
             coding, sections[section] = self._code_field(job, reader)
             components = field.n_components if len(field.shape) == 3 else 0
-            made = _listed(name, field, components, found.bound, section, (scan.low, scan.high), coding)
-            listed.append(dataclasses.replace(made, reduced=job.reduction) if coding == REDUCED else made)
+            reduced = job.reduction if coding == REDUCED else None
+            listed.append(entry_of(name, field, components, found.bound, section, (scan.low, scan.high), coding, reduced))
         return tuple(listed)
 
     def _code_field(self, job: _FieldJob, reader: FrameReader | None) -> tuple[int, bytes]:
         """The coding and the section of a field."""
-        field, found, surface = job.field, job.found, job.surface
+        field, found, surface = job.plan.field, job.plan.found, job.surface
         if job.is_normal and reader is not None:
             rule = find_normal_rule(field, reader, surface, found.bound)
             if rule is not None:
@@ -300,37 +290,35 @@ class _FieldJob:
     """A field whose rows are as they are decoded, on the mesh as it is decoded."""
 
     name: str
-    field: Field
-    found: Precision
-    scan: Scan
+    plan: FieldPlan
     surface: Surface
     polygons: Int32 | None
 
     @property
     def is_normal(self) -> bool:
         """Whether it is coded as directions."""
-        return self.field.kind == "normal" and self.found.bound > 0
+        return self.plan.field.kind == "normal" and self.plan.found.bound > 0
 
     @property
     def reduction(self) -> Reduction:
         """What its section has once."""
-        return NO_REDUCTION if self.is_normal else self.scan.reduction
+        return NO_REDUCTION if self.is_normal else self.plan.scan.reduction
 
     @property
     def rows(self) -> tuple[str, Int32 | None]:
         """The domain of its section's rows, and the polygons that they are."""
-        return ("polygon", self.polygons) if self.reduction.polygons else (self.field.domain, None)
+        return ("polygon", self.polygons) if self.reduction.polygons else (self.plan.field.domain, None)
 
     @property
     def bound(self) -> FieldBound:
         """What the section keeps."""
         if self.is_normal:
-            return angular_bound(self.found.bound)
-        return FieldBound(self.found.bound - self.scan.rounding) if self.found.bound else FieldBound(exact=True)
+            return angular_bound(self.plan.found.bound)
+        return self.plan.bound
 
     def read(self, start: int, stop: int) -> Array:
         """Frames as the section has them."""
-        block = self.field.read(start, stop)
+        block = self.plan.field.read(start, stop)
         if self.is_normal:
             return to_octahedral(block, start, self.name)
         return self.reduction.reduce(block, self.polygons)
@@ -347,19 +335,6 @@ class Origins:
     def of(self, domain: str) -> Int64 | None:
         """The source's row of each row of a domain; None for parts, which keep their order."""
         return {"vertex": self.vertices, "corner": self.corners, "triangle": self.triangles}.get(domain)
-
-
-def _listed(
-    name: str,
-    given: Attribute | Field,
-    components: int,
-    bound: float,
-    section: str,
-    span: tuple[float, float] | None = None,
-    coding: int = CODED,
-) -> Listed:
-    dtype = given.dtype.name if given.dtype != np.float64 else "float32"  # what is left of float64 behind an offset
-    return Listed(name, given.kind, given.domain, components, dtype, given.unit, bound, coding, section, span)
 
 
 def _with_losses(sequence: MeshSequence) -> Metadata:

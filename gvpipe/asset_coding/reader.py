@@ -8,9 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
@@ -31,6 +29,7 @@ from gvpipe.asset_coding.directory import (
     read_images,
     vertex_starts,
 )
+from gvpipe.asset_coding.field_values import FieldValues
 from gvpipe.asset_coding.reduction import NO_REDUCTION
 from gvpipe.asset_coding.volume_list import SECTION as VOLUME
 from gvpipe.coding.codec import FrameReader
@@ -203,7 +202,7 @@ class AssetReader:
         return rows[domain]
 
     def _field(self, listed: Listed) -> Field:
-        values = _FieldValues(self._frames_of(listed), self._shape_of(listed), listed, self._lock, self._path)
+        values = FieldValues(self._frames_of(listed), self._shape_of(listed), listed, self._lock, self._path)
         return Field(values, listed.domain, listed.kind, listed.unit, listed.range, f"field {listed.name!r}")
 
     def _shape_of(self, listed: Listed) -> tuple[int, ...]:
@@ -230,8 +229,7 @@ class AssetReader:
             return lambda start, stop: from_octahedral(_of_two(reader.read(start, stop), listed))
         if reduced == NO_REDUCTION:
             return reader.read
-        n_coded = max(reduced.columns, default=max(listed.components, 1) - 1) + 1
-        if reader.n_components != n_coded or reader.dtype.name != listed.dtype:
+        if reader.n_components != reduced.n_coded(max(listed.components, 1)) or reader.dtype.name != listed.dtype:
             raise corrupt_section(listed.section, "it does not hold what the section 'asset' lists")
         self._bitstream.budget.ask(f"field {listed.name!r}", 8 * math.prod(self._shape_of(listed)[1:]))
         return lambda start, stop: reduced.restore(reader.read(start, stop), polygons)
@@ -244,32 +242,6 @@ class AssetReader:
             _keep_rows(self._bitstream.budget, domain, self._bitstream.n_vertices, len(self.faces))
             self._meshes[domain] = FieldMesh(self.faces, self._bitstream.n_vertices, domain, polygons)
         return self._meshes[domain]
-
-
-class _FieldValues:
-    """A field's frames, decoded when they are sliced."""
-
-    def __init__(
-        self, read: Callable[[int, int], Array], shape: tuple[int, ...], listed: Listed, lock: ForkLock, path: str
-    ) -> None:
-        self._read, self._lock, self._listed, self._path = read, lock, listed, path
-        self.dtype = np.dtype(listed.type)
-        self.shape: tuple[int, ...] = shape
-        self.is_by_polygon = listed.reduced is not None and listed.reduced.polygons
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        raise TypeError(
-            f"field {self._listed.name!r} of {self._path or 'a geometry video'} cannot be pickled, since its frames are "
-            "decoded when they are read; pickle the video (gvpipe.open), and take the field from it afterwards"
-        )
-
-    def __getitem__(self, key: slice, /) -> Array:
-        start, stop, _ = key.indices(self.shape[0])
-        with self._lock, in_file(self._path):
-            block = self._read(start, max(start, stop))
-            if block.shape[1:] != (self.shape[1], self._listed.components or 1) or block.dtype != self.dtype:
-                raise corrupt_section(self._listed.section, "it does not hold what the section 'asset' lists")
-        return block if self._listed.components else block[:, :, 0]
 
 
 def _keep_rows(budget: Budget, domain: str, n_vertices: int, n_triangles: int) -> None:

@@ -48,6 +48,10 @@ class Reduction:
             block = np.repeat(block, polygons - 2, axis=1)
         return block
 
+    def n_coded(self, n_components: int) -> int:
+        """Components that the section has, of a field of C."""
+        return max(self.columns, default=n_components - 1) + 1
+
     def values(self) -> dict[str, object]:
         """It as JSON, for section ``asset``."""
         members = {"polygons": self.polygons, "columns": list(self.columns), "offsets": list(self.offsets)}
@@ -69,7 +73,7 @@ def read_reduction(values: JsonObject, n_components: int, domain: str) -> Reduct
     if by_polygon and domain != "triangle":
         raise values.wrong("polygons", "false where rows are vertices")
     columns = values.integers("columns", n_components, 0, MAX_COMPONENTS - 1) if "columns" in values else ()
-    n_coded = max(columns, default=n_components - 1) + 1
+    n_coded = Reduction(columns=columns).n_coded(n_components)
     if columns and sorted(set(columns)) != list(range(n_coded)):
         raise values.wrong("columns", "numbers from 0 on")
     offsets = values.numbers("offsets", n_coded, -LARGEST_OFFSET, LARGEST_OFFSET) if "offsets" in values else ()

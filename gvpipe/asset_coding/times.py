@@ -10,10 +10,9 @@ are even (docs/format.md, 11.3)::
 
 from __future__ import annotations
 
-import zlib
-
 import numpy as np
 
+from gvpipe.container.deflated import deflated, inflated
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import corrupt_section
 
@@ -32,7 +31,7 @@ def pack_times(times: tuple[float, ...]) -> bytes:
     padded = np.concatenate([np.zeros(2, np.int64), bits])
     differences = padded[2:] - 2 * padded[1:-1] + padded[:-2]  # wrap around
     zigzag = (differences << 1) ^ (differences >> 63)
-    return zlib.compress(np.ascontiguousarray(zigzag.astype("<i8").view(np.uint8).reshape(-1, 8).T).tobytes(), 9)
+    return deflated(np.ascontiguousarray(zigzag.astype("<i8").view(np.uint8).reshape(-1, 8).T).tobytes())
 
 
 def unpack_times(data: bytes, n_frames: int, budget: Budget = UNLIMITED) -> tuple[float, ...]:
@@ -43,13 +42,7 @@ def unpack_times(data: bytes, n_frames: int, budget: Budget = UNLIMITED) -> tupl
         OverBudget: it takes too much memory.
     """
     budget.ask(f"section {SECTION!r}", BYTES_PER_FRAME * n_frames, SECONDS_PER_FRAME * n_frames)
-    inflater = zlib.decompressobj()
-    try:
-        given = inflater.decompress(data, 8 * n_frames + 1)
-    except zlib.error as exc:
-        raise corrupt_section(SECTION, f"it does not inflate ({exc})") from exc
-    if len(given) != 8 * n_frames or not inflater.eof or inflater.unused_data:
-        raise corrupt_section(SECTION, f"it does not hold a time for each of {n_frames} frames")
+    given = inflated(data, 8 * n_frames, SECTION, f"a time for each of {n_frames} frames")
     planes = np.frombuffer(given, np.uint8)
     zigzag = np.ascontiguousarray(planes.reshape(8, -1).T).view("<u8")[:, 0]
     differences = (zigzag >> np.uint64(1)).astype(np.int64) ^ -(zigzag & np.uint64(1)).astype(np.int64)

@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Collection
+from typing import NamedTuple
 
 import numpy as np
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
-from gvpipe.asset_coding.bounds import Given, precision
-from gvpipe.asset_coding.directory import CODED, REDUCED, Listed
+from gvpipe.asset_coding.bounds import Given
+from gvpipe.asset_coding.directory import CODED, REDUCED, entry_of
+from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.reduction import NO_REDUCTION
-from gvpipe.asset_coding.scan import Scan, scan_field
 from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, IN_ORDER, ORDER, POINTS, SECTION, VolumeList, pack_volume
+from gvpipe.asset_coding.volume_rows import VolumeRows
 from gvpipe.coding.codec import FrameReader
 from gvpipe.connectivity.cell_traversal import encode_walk
 from gvpipe.connectivity.cells import encode_cells, encode_order
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.graph import FieldGraph
 from gvpipe.fields.values import FieldBound
-from gvpipe.foundation.arrays import Array, Int32, Int64
-from gvpipe.foundation.errors import InputError
-from gvpipe.grids.borders import cell_edges, cells_behind, inner_edges, node_edges
+from gvpipe.foundation.arrays import Int32, Int64
 from gvpipe.grids.cells import Cells
 from gvpipe.grids.volume import Volume
 from gvpipe.model.sequence import MeshSequence
@@ -32,6 +31,22 @@ from gvpipe.model.sequence import MeshSequence
 LOOKS = 8  # frames whose errors are measured
 AS_LARGE = 2.0  # a bound over the one that would leave the same error if errors were even: most are smaller
 PREFIXES = {"point": "volume.point.", "cell": "volume.cell."}
+
+
+class Shown(NamedTuple):
+    """The decoded surface.
+
+    Args:
+        permutation: ``(V,)`` the source's vertex of each that is decoded.
+        reader: of its frames.
+        faces: ``(T, 3)`` triangles, in the order in which files have them.
+        polygons: ``(P,)`` corners of each polygon; None: all are triangles.
+    """
+
+    permutation: Int64
+    reader: FrameReader
+    faces: Int32
+    polygons: Int32 | None
 
 
 class VolumeCoder:
@@ -46,155 +61,111 @@ class VolumeCoder:
         InputError: numbers that are not finite, or of digits that their bound does not keep.
     """
 
-    def __init__(self, sequence: MeshSequence, volume: Volume, options: AssetOptions, kept: Mapping[str, Any]) -> None:
+    def __init__(self, sequence: MeshSequence, volume: Volume, options: AssetOptions, kept: Collection[str]) -> None:
         self._sequence, self._volume = sequence, volume
-        self._numbers: list[tuple[str, str, Field, Scan, float, bool]] = []
-        for domain, fields in (("point", volume.point_fields), ("cell", volume.cell_fields)):
-            for name, field in fields.items():
-                if name in kept:
-                    self._numbers.append((domain, name, field, *self._bound(name, field, options)))
+        self._plans: list[tuple[str, FieldPlan]] = []
+        for name, field in (*volume.point_fields.items(), *volume.cell_fields.items()):
+            given: Given = options.fields if name in sequence.fields else options.attributes
+            if name not in kept:
+                continue
+            span = _span_of(sequence, name)
+            plan, _ = plan_field(name, field, given.get(name), sequence.name, span=span, place="inside, ")
+            if plan is not None:
+                self._plans.append((name, plan))
         self._known: tuple[bytes, dict[str, bytes]] = b"", {}  # sections of one order of vertices
 
-    def _bound(self, name: str, field: Field, options: AssetOptions) -> tuple[Scan, float, bool]:
-        """What the numbers are, the bound on each, and whether holes are kept."""
-        sequence = self._sequence
-        given: Given = options.fields if name in sequence.fields else options.attributes
-        is_float, what = field.dtype.kind == "f", f"field {name!r}"
-        holes = precision(given.get(name), field.kind, is_float, 1.0, 0, what, vectors=(1, 1.0)).holes
-        scan = scan_field(name, field, holes, sequence.name)
-        low, high, longest = _with_surface(scan, sequence, name)
-        vectors = (field.n_components, longest)
-        found = precision(given.get(name), field.kind, is_float, high - low, 0, what, scan.is_whole, vectors)
-        if scan.rounding > found.bound / 2:
-            raise InputError(
-                f"{sequence.name}: inside, field {name!r} is float64, and float32 rounds it by up to {scan.rounding:.2g}; "
-                f"give it a bound of {2 * scan.rounding:.2g} or more by --field"
-            )
-        return scan, found.bound, holes
-
-    def sections(
-        self,
-        permutation: Int64,
-        place: Int64,
-        reader: FrameReader,
-        shown: tuple[Int32, Int32 | None],
-        n_beside: int,
-        reorder: bool = False,
-        is_final: bool = True,
-    ) -> dict[str, bytes]:
+    def sections(self, shown: Shown, n_beside: int, reorder: bool = False, is_final: bool = True) -> dict[str, bytes]:
         """Return the sections.
 
         Args:
-            permutation: ``(V,)`` the source's vertex of each that is decoded.
-            place: its inverse.
-            reader: of the decoded surface.
-            shown: its triangles ``(T, 3)`` and polygons, as they are decoded.
+            shown: the surface.
             n_beside: bytes of the file without these sections.
             reorder: whether cells and inner points may come in another order.
             is_final: whether points are as fine as the surface is; else those of another quality may do, whose size is alike.
         """
-        key = permutation.tobytes()
+        key = shown.permutation.tobytes()
         if is_final or key != self._known[0]:
-            self._known = key, self._sections(permutation, place, reader, shown, n_beside, reorder)
+            self._known = key, self._sections(shown, n_beside, reorder)
         return self._known[1]
 
-    def _sections(
-        self,
-        permutation: Int64,
-        place: Int64,
-        reader: FrameReader,
-        shown: tuple[Int32, Int32 | None],
-        n_beside: int,
-        reorder: bool,
-    ) -> dict[str, bytes]:
+    def _sections(self, shown: Shown, n_beside: int, reorder: bool) -> dict[str, bytes]:
         volume, n_vertices = self._volume, self._sequence.n_vertices
-        renamed = np.concatenate([place, np.arange(n_vertices, n_vertices + volume.n_points)])
-        cells = Cells(volume.cells.types, volume.cells.offsets, renamed[volume.cells.nodes])
-        order = np.arange(len(renamed)) if volume.order is None else volume.order
-        order = np.concatenate([order[:n_vertices][permutation], order[n_vertices:]])
-        keeps = not reorder or bool(volume.blocks)
-        in_order = bytes([IN_ORDER]) + encode_cells(Cells(cells.types, cells.offsets, order[cells.nodes]))
-        walked = encode_walk(cells, *shown, (n_vertices, len(order)), keeps)
-        rows = {"point": np.arange(volume.n_points), "cell": np.arange(len(cells.types))}
-        made = {CELLS: in_order, ORDER: encode_order(order, n_vertices)}
-        if walked is not None and len(walked[0]) < len(in_order):
-            made[CELLS] = bytes([BY_WALK]) + walked[0]
-            if not keeps:
-                made[ORDER] = encode_order(None, n_vertices)
-                cells = walked[1].cells
-                rows = {"point": walked[1].points[n_vertices:] - n_vertices, "cell": walked[1].sources}
-        bound = self._point_bound(reader, permutation)
-        behind = cells_behind(cells, *shown)
-        is_inner = np.ones(len(cells.types), bool)
-        is_inner[behind[behind >= 0]] = False
-        graphs = {
-            "point": FieldGraph(inner_edges(node_edges(cells), n_vertices), volume.n_points, "point"),
-            "cell": FieldGraph(_among(cell_edges(cells), is_inner), int(is_inner.sum()), "cell"),
-        }
+        cells, sources, inner, made = self._code_cells(shown, reorder)
+        rows = VolumeRows(cells, shown.faces, shown.polygons, n_vertices, volume.n_points)
+        bound = self._point_bound(shown)
         if volume.n_points:
-            points, inner = volume.points, rows["point"]
             made[POINTS] = encode_field(
-                lambda start, stop: np.asarray(points[start:stop], np.float32)[:, inner],
-                points.shape[0],
-                graphs["point"],
+                lambda start, stop: np.asarray(volume.points[start:stop], np.float32)[:, inner],
+                volume.points.shape[0],
+                rows.graphs["point"],
                 FieldBound(bound) if bound else FieldBound(exact=True),
                 "points inside",
                 n_beside=n_beside,
             )
+        chosen = {"point": inner, "cell": sources[rows.inner]}
         listed = []
-        rows["cell"] = rows["cell"][is_inner]
-        for number, (domain, name, field, scan, limit, holes) in enumerate(self._numbers):
+        for number, (name, plan) in enumerate(self._plans):
+            field, scan, domain = plan.field, plan.scan, plan.field.domain
             section = f"{PREFIXES[domain]}{number}"
-            listed.append(_listed(name, field, domain, limit, section, scan))
-            if len(rows[domain]):
-                n_known = n_beside + sum(map(len, made.values()))
-                made[section] = _coded(field.select(rows[domain]), scan, limit, graphs[domain], name, holes, n_known)
-        unmoved = frozenset((domain, name) for domain, name, field, *_ in self._numbers if len(field) == 1)
+            components = field.n_components if len(field.shape) == 3 else 0
+            coding, reduced = (CODED, None) if scan.reduction == NO_REDUCTION else (REDUCED, scan.reduction)
+            span = (scan.low, scan.high)
+            listed.append(entry_of(name, field, components, plan.found.bound, section, span, coding, reduced))
+            if len(chosen[domain]):
+                some = plan._replace(field=field.select(chosen[domain]))
+                made[section] = _coded(name, some, rows.graphs[domain], n_beside + sum(map(len, made.values())))
+        unmoved = frozenset((plan.field.domain, name) for name, plan in self._plans if len(plan.field) == 1)
         about = VolumeList(len(cells.types), volume.n_points, bound, volume.blocks, tuple(listed), unmoved)
         return {SECTION: pack_volume(about), **made}
 
-    def _point_bound(self, reader: FrameReader, permutation: Int64) -> float:
+    def _code_cells(self, shown: Shown, reorder: bool) -> tuple[Cells, Int64, Int64, dict[str, bytes]]:
+        """The cells as they are decoded, the source's cell and inner point of each, and the sections."""
+        volume, n_vertices = self._volume, self._sequence.n_vertices
+        inner = np.arange(volume.n_points)
+        place = np.argsort(shown.permutation)  # permutations are undone by sorting
+        renamed = np.concatenate([place, n_vertices + inner])
+        cells = Cells(volume.cells.types, volume.cells.offsets, renamed[volume.cells.nodes])
+        order = np.arange(len(renamed)) if volume.order is None else volume.order
+        order = np.concatenate([order[:n_vertices][shown.permutation], order[n_vertices:]])
+        keeps = not reorder or bool(volume.blocks)
+        in_order = bytes([IN_ORDER]) + encode_cells(Cells(cells.types, cells.offsets, order[cells.nodes]))
+        walked = encode_walk(cells, shown.faces, shown.polygons, (n_vertices, len(order)), keeps)
+        made = {CELLS: in_order, ORDER: encode_order(order, n_vertices)}
+        sources = np.arange(len(cells.types))
+        if walked is not None and len(walked[0]) < len(in_order):
+            section, walk = walked
+            made[CELLS] = bytes([BY_WALK]) + section
+            if not keeps:
+                made[ORDER] = encode_order(None, n_vertices)
+                cells, sources, inner = walk.cells, walk.sources, walk.points[n_vertices:] - n_vertices
+        return cells, sources, inner, made
+
+    def _point_bound(self, shown: Shown) -> float:
         """The bound on coordinates that leaves inner points the surface's root mean square error, and no larger one."""
         sequence = self._sequence
         squares, largest, count = 0.0, 0.0, 0
         for frame in np.unique(np.linspace(0, sequence.n_frames - 1, LOOKS).astype(int)).tolist():
-            errors = reader.read(frame, frame + 1)[0].astype(np.float64) - sequence.read_exact(frame, frame + 1)[0][permutation]
+            decoded = shown.reader.read(frame, frame + 1)[0].astype(np.float64)
+            errors = decoded - sequence.read_exact(frame, frame + 1)[0][shown.permutation]
             squares, count = squares + float(np.square(errors).sum()), count + errors.size
             largest = max(largest, float(np.linalg.norm(errors, axis=1).max(initial=0)))
         return min(AS_LARGE * math.sqrt(3 * squares / max(count, 1)), largest / math.sqrt(3))
 
 
-def _with_surface(scan: Scan, sequence: MeshSequence, name: str) -> tuple[float, float, float]:
-    """Smallest and largest value and longest vector, of a frame of the surface, too."""
+def _span_of(sequence: MeshSequence, name: str) -> tuple[float, float]:
+    """Smallest and largest number of the surface, of the first frame of a field."""
     one: Field | Attribute = sequence.fields[name] if name in sequence.fields else sequence.attributes[name]
-    values = one.read(0, 1) if isinstance(one, Field) else np.asarray(one)
-    low, high = float(np.nanmin(values, initial=scan.low)), float(np.nanmax(values, initial=scan.high))
-    return low, high, scan.longest
+    values = (one.read(0, 1) if isinstance(one, Field) else np.asarray(one)).astype(np.float64)
+    return float(np.fmin.reduce(values, axis=None, initial=np.inf)), float(np.fmax.reduce(values, axis=None, initial=-np.inf))
 
 
-def _among(edges: Int64, is_kept: Array) -> Int64:
-    """Edges between rows that are kept, by their numbers among these."""
-    number = np.cumsum(is_kept) - 1
-    return np.asarray(number[edges[is_kept[edges].all(axis=1)]])
-
-
-def _listed(name: str, field: Field, domain: str, bound: float, section: str, scan: Scan) -> Listed:
-    components = field.n_components if len(field.shape) == 3 else 0
-    dtype = field.dtype.name if field.dtype != np.float64 else "float32"
-    is_reduced = scan.reduction != NO_REDUCTION
-    coding, reduced = (REDUCED, scan.reduction) if is_reduced else (CODED, None)
-    span = (scan.low, scan.high)
-    return Listed(name, field.kind, domain, components, dtype, field.unit, bound, coding, section, span, reduced)
-
-
-def _coded(field: Field, scan: Scan, bound: float, graph: FieldGraph, name: str, holes: bool, n_beside: int) -> bytes:
-    reduction = scan.reduction
+def _coded(name: str, plan: FieldPlan, graph: FieldGraph, n_beside: int) -> bytes:
     return encode_field(
-        lambda start, stop: reduction.reduce(field.read(start, stop), None),
-        len(field),
+        lambda start, stop: plan.scan.reduction.reduce(plan.field.read(start, stop), None),
+        len(plan.field),
         graph,
-        FieldBound(bound - scan.rounding) if bound else FieldBound(exact=True),
+        plan.bound,
         name,
-        holes=holes,
+        holes=plan.found.holes,
         n_beside=n_beside,
     )

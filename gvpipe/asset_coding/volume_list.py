@@ -2,8 +2,8 @@
 
 ``volume.cells`` is a byte and what `gvpipe.connectivity.cells` or `gvpipe.connectivity.cell_traversal` writes; ``volume.order``
 is that of `gvpipe.connectivity.cells`; ``volume.points``, ``volume.point.i`` and
-``volume.cell.i`` are fields (`gvpipe.fields`) of one frame or of all, whose rows are the inner points, or the cells of which no
-face is a polygon of the surface: the others have the surface's numbers.
+``volume.cell.i`` are fields (`gvpipe.fields`) of one frame or of all. Their rows are the inner points, or the inner cells, of
+which no face is a polygon of the surface. The other cells have the surface's numbers (`gvpipe.asset_coding.volume_rows`).
 """
 
 from __future__ import annotations

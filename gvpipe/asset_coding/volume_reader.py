@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -10,17 +10,17 @@ import numpy as np
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
 from gvpipe.asset_coding.directory import CODED, REDUCED, Listed
+from gvpipe.asset_coding.field_values import Decode, FieldValues
 from gvpipe.asset_coding.reduction import NO_REDUCTION
 from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, IN_ORDER, ORDER, POINTS, SECTION, VERSION, VolumeList, unpack_volume
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.arrays import Array, Int32
-from gvpipe.foundation.errors import InputError, corrupt_section, in_file
+from gvpipe.foundation.errors import InputError, corrupt_section
 from gvpipe.grids.volume import Volume
 from gvpipe.runtime.forks import ForkLock
 
 BYTES_PER_CELL, SECONDS_PER_CELL = 1200, 6e-6  # of faces, edges and the graph
 BYTES_PER_POINT, SECONDS_PER_POINT = 1500, 8e-6
-Read = Callable[[int, int], Array]
 
 
 def read_volume_list(bitstream: Bitstream) -> VolumeList | None:
@@ -64,10 +64,9 @@ class _VolumeReader:
         fields: Mapping[str, Field],
         path: str,
     ) -> None:
+        from gvpipe.asset_coding.volume_rows import VolumeRows
         from gvpipe.connectivity.cell_traversal import decode_walk
         from gvpipe.connectivity.cells import decode_cells, decode_order
-        from gvpipe.fields.graph import FieldGraph
-        from gvpipe.grids.borders import cell_edges, cells_behind, inner_edges, node_edges
         from gvpipe.grids.cells import Cells
 
         self._bitstream, self._listed, self._path = bitstream, listed, path
@@ -91,41 +90,28 @@ class _VolumeReader:
             row[self._order] = np.arange(n_points)
             cells = Cells(cells.types, cells.offsets, row[cells.nodes])
         self._cells = cells
-        faces, polygons = surface
-        behind = cells_behind(cells, faces, polygons)
-        counts = np.ones(len(behind), np.int64) if polygons is None else polygons.astype(np.int64) - 2
-        triangles = np.cumsum(counts) - counts
-        self._triangle = np.full(listed.cells, -1, np.int64)  # the first of the surface that a cell has; -1: none
-        is_face = behind >= 0
-        self._triangle[behind[is_face][::-1]] = triangles[is_face][::-1]
-        self._inner = np.flatnonzero(self._triangle < 0)
-        number = np.cumsum(self._triangle < 0) - 1
-        edges = cell_edges(cells)
-        edges = number[edges[(self._triangle[edges] < 0).all(axis=1)]]
-        self._graphs = {
-            "point": FieldGraph(inner_edges(node_edges(cells), n_vertices), listed.points, "point"),
-            "cell": FieldGraph(edges, len(self._inner), "cell"),
-        }
+        self._rows = VolumeRows(cells, *surface, n_vertices, listed.points)
 
     def volume(self) -> Volume:
         """The volume."""
         listed, n_frames = self._listed, self._bitstream.n_frames
-        points = _Numbers(self._read_points(), (n_frames, listed.points, 3), np.dtype(np.float32), self._lock, self._path)
+        about = Listed("points", "vector", "point", 3, "float32", "", listed.bound, CODED, POINTS)
+        points = FieldValues(self._read_points(), (n_frames, listed.points, 3), about, self._lock, self._path)
         try:
             return Volume(self._cells, points, self._order, self._numbers_of("point"), self._numbers_of("cell"), listed.blocks)
         except InputError as exc:
             raise corrupt_section(SECTION, str(exc)) from exc
 
-    def _read_points(self) -> Read:
+    def _read_points(self) -> Decode:
         if not self._listed.points:
             return lambda start, stop: np.zeros((stop - start, 0, 3), np.float32)
         return self._reader(POINTS, "point", self._bitstream.n_frames, 3, "float32")
 
-    def _reader(self, section: str, domain: str, n_frames: int, n_components: int, dtype: str) -> Read:
+    def _reader(self, section: str, domain: str, n_frames: int, n_components: int, dtype: str) -> Decode:
         from gvpipe.fields.reader import FieldReader
 
         bitstream = self._bitstream
-        reader = FieldReader(bitstream.section(section), n_frames, self._graphs[domain], section, budget=bitstream.budget)
+        reader = FieldReader(bitstream.section(section), n_frames, self._rows.graphs[domain], section, budget=bitstream.budget)
         if "derived" in reader.modes:
             raise corrupt_section(section, "its values follow from positions of the surface")
         if reader.n_components != n_components or reader.dtype.name != dtype:
@@ -142,15 +128,15 @@ class _VolumeReader:
             n_frames = 1 if (domain, each.name) in self._listed.unmoved else self._bitstream.n_frames
             n_rows = self._listed.points if domain == "point" else self._listed.cells
             shape = (n_frames, n_rows, each.components) if each.components else (n_frames, n_rows)
-            values = _Numbers(self._values(each, n_frames), shape, np.dtype(each.type), self._lock, self._path)
+            values = FieldValues(self._values(each, n_frames), shape, each, self._lock, self._path)
             made[each.name] = Field(values, domain, each.kind, each.unit, each.range, f"field {each.name!r}")
         return made
 
-    def _values(self, each: Listed, n_frames: int) -> Read:
+    def _values(self, each: Listed, n_frames: int) -> Decode:
         """What decodes frames of all points, or of all cells, of a name: ``(start, stop) -> (n, R, C)``."""
         reduced = each.reduced or NO_REDUCTION
-        n_coded = max(reduced.columns, default=max(each.components, 1) - 1) + 1
-        rows = self._listed.points if each.domain == "point" else len(self._inner)
+        n_coded = reduced.n_coded(max(each.components, 1))
+        rows = self._listed.points if each.domain == "point" else len(self._rows.inner)
 
         def inner(start: int, stop: int) -> Array:
             if not rows:
@@ -160,28 +146,15 @@ class _VolumeReader:
         read = self._reader(each.section, each.domain, n_frames, n_coded, each.dtype) if rows else inner
         return inner if each.domain == "point" else partial(self._all_cells, each, inner)
 
-    def _all_cells(self, each: Listed, inner: Read, start: int, stop: int) -> Array:
+    def _all_cells(self, each: Listed, inner: Decode, start: int, stop: int) -> Array:
         found = inner(start, stop)
         values = np.empty((stop - start, self._listed.cells, found.shape[2]), found.dtype)
-        values[:, self._inner] = found
-        at = np.flatnonzero(self._triangle >= 0)
+        values[:, self._rows.inner] = found
+        triangles = self._rows.triangles
+        at = np.flatnonzero(triangles >= 0)
         shown = self._fields.get(each.name)
         surface = np.asarray(self._attributes[each.name])[None] if shown is None else shown.read(start, stop)
-        if surface.shape[1] <= int(self._triangle.max(initial=-1)) or surface.shape[2] != values.shape[2]:
+        if surface.shape[1] <= int(triangles.max(initial=-1)) or surface.shape[2] != values.shape[2]:
             raise corrupt_section(SECTION, f"cells and triangles have other numbers {each.name!r}")
-        values[:, at] = surface[:, self._triangle[at]]
+        values[:, at] = surface[:, triangles[at]]
         return values
-
-
-class _Numbers:
-    """Frames that are decoded when they are sliced."""
-
-    def __init__(self, read: Read, shape: tuple[int, ...], dtype: np.dtype[np.generic], lock: ForkLock, path: str) -> None:
-        self._read, self._lock, self._path = read, lock, path
-        self.shape, self.dtype = shape, dtype
-
-    def __getitem__(self, key: slice, /) -> Array:
-        start, stop, _ = key.indices(self.shape[0])
-        with self._lock, in_file(self._path):
-            block = self._read(start, max(start, stop))
-        return block if len(self.shape) == 3 else block[:, :, 0]

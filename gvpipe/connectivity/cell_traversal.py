@@ -1,8 +1,8 @@
 """Cells of a grid <-> bytes by a walk from the surface inwards: hardly any number of a point is coded.
 
-The faces of the surface are known. The last face that has no cell behind it yet is taken; the cell behind it has some type,
-stands on the face in some pose, and its other nodes are new points, or points of neighbouring open faces, which are ranked by
-how many edges lead to them. Cells and inner points come in the order of the walk. What their order was costs extra::
+The faces of the surface are known. The face that has waited longest for a cell behind it is taken. That cell has some type,
+and stands on the face in some pose. Its other nodes are new points, or points of open faces near it, ranked by how many edges
+lead to them. Cells and inner points come in the order of the walk. What their order was costs extra::
 
     section = [8 bits] keeps (0, 1), [block] marks, [block] walk, if it keeps: [block] packed cells, packed inner points
 
@@ -19,9 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvpipe.asset.polygons import polygon_starts
 from gvpipe.connectivity.cell_poses import KINDS, make_poses
-from gvpipe.connectivity.planes import deflated, from_planes, inflated, to_planes
+from gvpipe.connectivity.planes import from_planes, to_planes
 from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.container.deflated import deflated, inflated
 from gvpipe.foundation.arrays import Bool, Int32, Int64
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import corrupt_section
@@ -147,7 +149,7 @@ def decode_walk(
 
 def _seeds(faces: Int32, polygons: Int32 | None, behind: Int64 | None) -> Seeds:
     sizes = np.full(len(faces), 3) if polygons is None else polygons.astype(np.int64)
-    starts = np.cumsum(sizes - 2) - (sizes - 2)
+    starts = polygon_starts(sizes)
     nodes = np.zeros((len(sizes), 4), np.int64)
     nodes[:, :3] = faces[starts]
     quads = np.flatnonzero(sizes == 4)

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.connectivity.planes import deflated, from_planes, inflated, to_planes
+from gvpipe.connectivity.planes import from_planes, to_planes
 from gvpipe.container.cursor import Cursor, varint
+from gvpipe.container.deflated import deflated, inflated
 from gvpipe.foundation.arrays import Int64
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import corrupt_section

@@ -83,8 +83,8 @@ def collate_tensors(samples: Sequence[Mapping[str, Any]], *, packed: bool = Fals
 class WebDatasetDecoder:
     """Decodes samples of the ``webdataset`` package: ``WebDataset(shards).decode(webdataset_decoder(shards))``.
 
-    Called with the name of a sample's member and its bytes, it returns a dictionary for ``.mp4``, and None for others,
-    which ``webdataset`` then gives to its next decoder. Pickles, so that workers have it, too.
+    It is called with the name of a sample's member and its bytes, and returns a dictionary for ``.mp4``. For others it returns
+    None: ``webdataset`` then gives them to its next decoder. Pickles, so that workers have it, too.
 
     Args:
         shards: what has the sections that files share, as for `gvpipe.datasets.open`; None: no file shares any.

@@ -26,15 +26,15 @@ KEYS = ("box", "mean", "scale", "topology")
 def describe_positions(bitstream: Bitstream, shared: SharedParts | None = None) -> dict[str, Any]:
     """Decode a sequence; return ``box`` (least and largest x, y, z of all frames), ``mean``, ``scale`` and ``topology``.
 
-    ``scale`` is the root mean square of the distances of all vertices in all frames from ``mean``, ``topology`` is the same
-    for sequences of the same triangles.
+        ``scale`` is the root mean square of all vertices' distances from ``mean``, in all frames. ``topology`` is the same for
+    sequences of the same triangles.
 
-    Args:
-        bitstream: of the sequence.
-        shared: decoded parts that files of one connectivity share; None: nothing.
+        Args:
+            bitstream: of the sequence.
+            shared: decoded parts that files of one connectivity share; None: nothing.
 
-    Raises:
-        FormatError: it cannot be decoded.
+        Raises:
+            FormatError: it cannot be decoded.
     """
     reader = open_reader(replace(bitstream, shared=shared))
     step = max(1, BLOCK_BYTES // (12 * bitstream.n_vertices))

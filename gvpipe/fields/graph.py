@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.foundation.arrays import Int64
 from gvpipe.runtime.forks import kept
 from gvpipe.trajectory.causal_order import CausalOrder
 
@@ -184,9 +184,3 @@ def _coarsest(graph: csr_array, names: Int64) -> _Wave:
     flat = np.array([each for ring in rings for each in ring], np.int64)
     sizes = np.array([len(ring) for ring in rings], np.int64)
     return _Wave(names, sizes, sizes, names[flat] if len(flat) else flat)
-
-
-def row_edges(rows: Int32, size: int) -> Int64:
-    """All pairs of the numbers in each row of ``(n, size)``, as edges."""
-    pairs = [(rows[:, i], rows[:, j]) for i in range(size) for j in range(i + 1, size)]
-    return np.concatenate([np.stack(pair, axis=1) for pair in pairs]).astype(np.int64)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvpipe.asset.polygons import polygon_starts
 from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.grids.cells import VOLUMES, Cells
 from gvpipe.mesh.unique_rows import row_ids
@@ -94,7 +95,7 @@ def inner_edges(edges: Int64, n_surface: int) -> Int64:
 
 def _outlines(faces: Int32, counts: Int64, width: int) -> Int32:
     """The corners of each polygon as rows of a `FaceList`; polygons of more corners than any face are rows of -1."""
-    starts = np.cumsum(counts - 2) - (counts - 2)
+    starts = polygon_starts(counts)
     rows = np.full((len(counts), width), -1, np.int32)
     for size in np.unique(counts[counts <= width]).tolist():
         at = np.flatnonzero(counts == size)

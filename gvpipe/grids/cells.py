@@ -137,6 +137,13 @@ class Cells:
         """``(M,)`` number of nodes of each cell."""
         return np.asarray(np.diff(self.offsets))
 
+    def select(self, rows: Int64) -> Cells:
+        """Some of the cells, in the order of their numbers ``rows``."""
+        sizes = self.sizes[rows]
+        ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+        within = np.arange(ends[-1]) - np.repeat(ends[:-1], sizes)
+        return Cells(self.types[rows], ends, self.nodes[np.repeat(self.offsets[rows], sizes) + within])
+
     def equals(self, other: Cells) -> bool:
         """Whether both are the same cells in the same order."""
         return self is other or (

@@ -1,9 +1,9 @@
 """The values between which colours run: given as numbers, or found among the values that are drawn.
 
 A percentile is looked up digit by digit in a histogram, so that memory does not grow with frames or vertices: float64 sort like
-the integers that `_keys` makes of them. A first pass over the frames counts values by the upper 16 bits of these integers, a
-second one by the next 16 bits of those that share the wanted value's. What is returned has 21 significant bits of the value at
-that rank (nearest rank below, as NumPy's ``method="lower"``), rounded towards 0.
+the integers that `_keys` makes of them. A first pass over the frames counts values by the upper 16 bits of these integers. A
+second one counts those that share the wanted value's upper bits, by their next 16. What is returned has 21 significant bits of
+the value at that rank (nearest rank below, as NumPy's ``method="lower"``), rounded towards 0.
 """
 
 from __future__ import annotations

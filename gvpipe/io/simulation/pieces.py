@@ -77,7 +77,7 @@ def _without_ghosts(step: Dataset) -> Dataset:
     rows = np.flatnonzero(kept)
     ends = np.cumsum([0, *(count for _, count in step.blocks)])
     blocks = tuple((name, int(kept[ends[k] : ends[k + 1]].sum())) for k, (name, _) in enumerate(step.blocks))
-    some = _select(cells, rows)
+    some = cells.select(rows)
     said = f"{len(kept) - len(rows)} ghost cells are left out"
     return replace(shown, cells=lambda: some, cell_data=_rows(shown.cell_data, rows), blocks=blocks, notes=(*shown.notes, said))
 
@@ -123,10 +123,3 @@ def _rows(data: Mapping[str, DataArray], rows: Int64) -> dict[str, DataArray]:
         return np.asarray(values[rows])
 
     return {name: one._replace(read=partial(read, one)) for name, one in data.items()}
-
-
-def _select(cells: Cells, rows: Int64) -> Cells:
-    sizes = cells.sizes[rows]
-    ends = np.cumsum([0, *sizes.tolist()])
-    within = np.arange(ends[-1]) - np.repeat(ends[:-1], sizes)
-    return Cells(cells.types[rows], ends.astype(np.int64), cells.nodes[np.repeat(cells.offsets[rows], sizes) + within])

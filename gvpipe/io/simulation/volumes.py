@@ -11,7 +11,7 @@ import numpy as np
 from gvpipe.asset.field import Field
 from gvpipe.foundation.arrays import Bool, Float32, Float64, Int64
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import HIGHER_ORDER, VOLUMES, Cells
+from gvpipe.grids.cells import HIGHER_ORDER, SIZE_OF_TYPE, VOLUMES, Cells
 from gvpipe.grids.volume import Volume
 from gvpipe.io.formats import BY_MESHIO
 from gvpipe.io.simulation.dataset import Dataset, surface_values
@@ -21,7 +21,6 @@ from gvpipe.io.simulation.step_frames import StepColumn, StepFrames, is_still
 from gvpipe.model.origin import narrow
 
 LINEAR = {71: 10, 78: 10, 72: 12, 79: 12, 73: 13, 80: 13, 74: 14, 81: 14}  # of cells of higher order, whose corners are kept
-CORNERS = {10: 4, 12: 8, 13: 6, 14: 5}
 
 
 class FileSteps:
@@ -80,7 +79,7 @@ def read_volume(frames: StepFrames, names: Sequence[str]) -> Volume | None:
     solid = np.flatnonzero(is_solid)
     if not len(solid):
         return None
-    own = _corners_of_higher_order(_select(cells, is_solid))
+    own = _corners_of_higher_order(cells.select(solid))
     inner = np.setdiff1d(own.nodes, surface.points)
     rows = np.concatenate([surface.points, inner])
     number = np.full(int(rows.max()) + 1, -1, np.int64)
@@ -90,12 +89,14 @@ def read_volume(frames: StepFrames, names: Sequence[str]) -> Volume | None:
     point_fields: dict[str, Field] = {}
     cell_fields: dict[str, Field] = {}
     for name, read in surface_values(frames.first, inside).items():
-        domain = "point" if frames.values[name]().domain == "vertex" else "cell"
-        if name not in names or (domain == "point" and not len(inner)):
+        if name not in names:
             continue
         first = frames.guarded(0, read)
-        column = StepColumn(frames, name, first.values, inside)
-        values = first.values[None] if is_still(frames, name, first.values, inside) else column
+        domain = "point" if first.domain == "vertex" else "cell"
+        if domain == "point" and not len(inner):
+            continue
+        still = is_still(frames, name, first.values, inside)
+        values = first.values[None] if still else StepColumn(frames, name, first.values, inside)
         kind = "vector" if first.kind == "normal" else first.kind
         made = Field(values, domain, kind, first.unit, name=f"{frames.path}: field {name!r}")
         (point_fields if domain == "point" else cell_fields)[name] = made
@@ -109,22 +110,13 @@ def read_volume(frames: StepFrames, names: Sequence[str]) -> Volume | None:
     )
 
 
-def _select(cells: Cells, is_kept: Bool) -> Cells:
-    sizes = cells.sizes
-    return Cells(
-        cells.types[is_kept],
-        np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes[is_kept])]),
-        cells.nodes[np.repeat(is_kept, sizes)],
-    )
-
-
 def _corners_of_higher_order(cells: Cells) -> Cells:
     """Cells of arbitrary order as linear ones."""
     if not np.isin(cells.types, list(HIGHER_ORDER)).any():
         return cells
     types = np.array([LINEAR.get(kind, kind) for kind in range(256)], np.uint8)[cells.types]
     sizes = cells.sizes
-    kept = np.where(types == cells.types, sizes, [CORNERS.get(kind, 0) for kind in types.tolist()])
+    kept = np.where(types == cells.types, sizes, SIZE_OF_TYPE[types])
     place = np.arange(len(cells.nodes)) - np.repeat(cells.offsets[:-1], sizes)
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(kept)])
     return Cells(types, offsets, cells.nodes[place < np.repeat(kept, sizes)])

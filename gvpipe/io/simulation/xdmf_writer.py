@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
@@ -106,7 +106,7 @@ def _light(sequence: MeshSequence, content: GridContent, heavy: str) -> str:
     for frame, time in enumerate(sequence.times.tolist()):
         place = (
             f'<DataItem Dimensions="{sequence.n_vertices} 3" NumberType="Float" Precision="{width}" Format="HDF">'
-            f"{_named(heavy)}:/points/{frame}</DataItem>"
+            f"{escape(heavy)}:/points/{frame}</DataItem>"
         )
         attributes = "".join(
             _attribute(content, domain, key, number, frame, heavy)
@@ -139,9 +139,5 @@ def _item(heavy: str, place: str, values: Array, shape: tuple[int, ...] | None =
     kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind]
     return (
         f'<DataItem Dimensions="{dimensions}" NumberType="{kind}" Precision="{values.dtype.itemsize}" Format="HDF">'
-        f"{_named(heavy)}:/{place}</DataItem>"
+        f"{escape(heavy)}:/{place}</DataItem>"
     )
-
-
-def _named(heavy: str) -> str:
-    return heavy.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

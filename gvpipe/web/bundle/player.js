@@ -4485,15 +4485,18 @@ input {
   margin: 0;
   color: var(--quiet);
 }
-.legend {
+.legend,
+.probe {
   position: absolute;
-  inset: auto auto 10px 10px;
-  width: min(15rem, calc(100% - 20px));
   box-sizing: border-box;
   padding: 6px 10px;
   border: 1px solid var(--line);
   border-radius: 9px;
   background: var(--surface);
+}
+.legend {
+  inset: auto auto 10px 10px;
+  width: min(15rem, calc(100% - 20px));
   pointer-events: none;
 }
 .legend[hidden] {
@@ -4548,14 +4551,8 @@ input {
   cursor: text;
 }
 .probe {
-  position: absolute;
   inset: 10px auto auto 10px;
   width: min(17rem, calc(100% - 20px));
-  box-sizing: border-box;
-  padding: 6px 10px;
-  border: 1px solid var(--line);
-  border-radius: 9px;
-  background: var(--surface);
 }
 .probe[hidden] {
   display: none;
