@@ -334,6 +334,8 @@ export class GeometryVideo {
     this.images = asset.images;
     /** (P) corners of each polygon, or null if all are triangles. */
     this.polygons = asset.polygons;
+    /** What lies inside of the surface (`volume/volume.js`), or null. */
+    this.volume = asset.volume;
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
     this.notes = asset.notes;
