@@ -122,6 +122,8 @@ export class GeometryVideo {
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
+    /** What positions count from, model units: a point of the source. */
+    this.origin = header.origin ?? [0, 0, 0];
     /** Of the whole file. */
     this.byteLength = byteLength;
     this.#repeated = repeated;

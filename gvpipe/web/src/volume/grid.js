@@ -30,7 +30,9 @@ export async function openGrid(kernels, surface, { sections, counts }) {
     point: () => graphOrder(pointEdges(cells, counts.vertices), counts.inner),
     cell: () => graphOrder(edges, inner.length),
   };
-  return { grid: { ...cells, triangles, inner }, orders };
+  const rows = new Int32Array(counts.cells).fill(-1);
+  inner.forEach((cell, row) => (rows[cell] = row));
+  return { grid: { ...cells, triangles, inner, rows }, orders };
 }
 
 /** Cells whose nodes are rows, of cells whose nodes are the grid's points. */

@@ -90,7 +90,7 @@ async function sectionOf(payload, name) {
  * @typedef {object} Grid
  * @property {Uint8Array} types (M) VTK's numbers @property {Int32Array} offsets (M + 1) @property {Int32Array} nodes
  * @property {Int32Array} triangles (M) the surface's triangle whose numbers a cell has, -1 for inner cells
- * @property {Int32Array} inner numbers of the inner cells
+ * @property {Int32Array} inner numbers of the inner cells @property {Int32Array} rows (M) of inner cells among these, else -1
  */
 export class Volume {
   #payload;
