@@ -26,7 +26,7 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.option(
         "--clip",
         metavar="PLANE",
-        help="Cut by a plane: x=0.3, y=30% (of the box), or -x=0.3, which leaves out what lies below.",
+        help="Cut by a plane: x=0.3, y=30% (of the box), or -x=0.3 (what lies below is left out).",
     ),
     click.option("--camera", metavar="VIEW", help="front, back, left, right, top, bottom, three-quarter or AZIMUTH,ELEVATION."),
     click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True),

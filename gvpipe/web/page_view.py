@@ -1,4 +1,4 @@
-"""How a page opens: the field and its colours, speed, displacements, a cut, camera and shading, as attributes of ``<geometry-video>``.
+"""How a page opens: field and colours, speed, displacements, a cut, camera, shading, as attributes of ``<geometry-video>``.
 
 What is asked for is checked against the file when the page is written. Ranges that depend on values (percentiles, symmetric,
 those of a log scale) are looked up then, over all frames, by the code that `gvpipe.render` uses. The page has their numbers.
