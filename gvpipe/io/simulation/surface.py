@@ -26,7 +26,7 @@ from gvpipe.grids.cells import (
     VOLUMES,
     Cells,
 )
-from gvpipe.io.left_behind import LeftBehind
+from gvpipe.io.left_behind import INNER_POINTS, VOLUME_CELLS, LeftBehind
 from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.mesh.unique_rows import row_ids
 
@@ -118,9 +118,9 @@ def _left_behind(cells: Cells, n_covered: int) -> LeftBehind:
 def _add_inside(left: LeftBehind, cells: Cells, used: Int64) -> None:
     """Note what lies inside of the surface."""
     is_solid = np.isin(cells.types, list(VOLUMES))
-    left.add("volume cells", int(is_solid.sum()))
+    left.add(VOLUME_CELLS, int(is_solid.sum()))
     nodes = np.unique(cells.nodes[np.repeat(is_solid, cells.sizes)])
-    left.add("inner points", len(np.setdiff1d(nodes, used, assume_unique=True)))
+    left.add(INNER_POINTS, len(np.setdiff1d(nodes, used, assume_unique=True)))
 
 
 def _flat_faces(cells: Cells) -> list[_Faces]:
