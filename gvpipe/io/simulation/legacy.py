@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Floats, Int64
-from gvpipe.grids.cells import Cells, join_cells, structured_cells
+from gvpipe.foundation.arrays import Array, Floats, Int64, UInt8
+from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells, structured_cells
+from gvpipe.grids.polyhedra import from_streams
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.limits import check_bytes
@@ -190,7 +191,8 @@ def _cells(parsed: _Parsed, kind: str) -> Cells:
         if not parsed.lists or parsed.types is None:
             raise ValueError("it has no CELLS or no CELL_TYPES")
         offsets, nodes = parsed.lists[0]
-        return Cells(parsed.types.astype(np.uint8), offsets, nodes)
+        types = parsed.types.astype(np.uint8)
+        return _with_polyhedra(types, offsets, nodes) if (types == POLYHEDRON).any() else Cells(types, offsets, nodes)
     if kind == "POLYDATA":
         if not parsed.lists:
             raise ValueError("it has no polygons; a mesh is needed")
@@ -201,6 +203,24 @@ def _cells(parsed: _Parsed, kind: str) -> Cells:
     if parsed.dimensions is None:
         raise ValueError(f"its data set is {kind[:40]!r} without dimensions")
     return structured_cells(parsed.dimensions)
+
+
+def _with_polyhedra(types: UInt8, offsets: Int64, nodes: Int64) -> Cells:
+    """Cells whose polyhedra are streams of faces, by their points."""
+    if len(offsets) != len(types) + 1 or offsets[0] != 0 or offsets[-1] != len(nodes):
+        return Cells(types, offsets, nodes)  # which says what is wrong
+    is_polyhedron = types == POLYHEDRON
+    polyhedra = from_streams(nodes, offsets[:-1][is_polyhedron], offsets[1:][is_polyhedron])
+    corners = np.repeat(np.arange(len(polyhedra.counts)), polyhedra.counts)
+    pairs = np.unique(np.stack([np.repeat(corners, polyhedra.sizes), polyhedra.nodes], axis=1), axis=0)
+    sizes = np.diff(offsets)
+    sizes[is_polyhedron] = np.bincount(pairs[:, 0], minlength=len(polyhedra.counts))
+    ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    made = np.empty(ends[-1], np.int64)
+    own = np.repeat(is_polyhedron, sizes)
+    made[own] = pairs[:, 1]
+    made[~own] = nodes[np.repeat(~is_polyhedron, np.diff(offsets))]
+    return Cells(types, ends, made, polyhedra)
 
 
 def _read_cells(cursor: _Cursor, word: str) -> tuple[Int64, Int64]:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64, Int64, UInt8
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import Cells, join_cells, structured_cells
+from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells, structured_cells
+from gvpipe.grids.polyhedra import Polyhedra, from_faces, from_streams
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
@@ -273,24 +274,36 @@ def _cells(given: Any, dimensions: Sequence[int] | None) -> Cells:
             types = given.GetCellTypes()
         except TypeError:  # before VTK 9.6
             types = given.GetCellTypesArray()
-        return Cells(
-            _numpy(types).astype(np.uint8).reshape(-1),
-            _numpy(held.GetOffsetsArray()).astype(np.int64),
-            _numpy(held.GetConnectivityArray()).astype(np.int64),
-        )
+        kinds = _numpy(types).astype(np.uint8).reshape(-1)
+        return Cells(kinds, *_list_of(held), _polyhedra(given, kinds))
     if given.IsA("vtkPolyData"):
         pieces = []
         for group, kind in POLY_CELLS.items():
             held = getattr(given, f"Get{group}")()
             if held is not None and held.GetNumberOfCells():
-                offsets, nodes = (
-                    _numpy(each).astype(np.int64) for each in (held.GetOffsetsArray(), held.GetConnectivityArray())
-                )
+                offsets, nodes = _list_of(held)
                 pieces.append(Cells(np.full(len(offsets) - 1, kind, np.uint8), offsets, nodes))
         return join_cells(pieces, [0] * len(pieces))
     if dimensions is not None and len(dimensions) == 3:
         return structured_cells((dimensions[0], dimensions[1], dimensions[2]))
     raise ValueError(f"it is a {given.GetClassName()}, whose cells are not read")
+
+
+def _list_of(held: Any) -> tuple[Int64, Int64]:
+    """Offsets and numbers of a vtkCellArray."""
+    return _numpy(held.GetOffsetsArray()).astype(np.int64), _numpy(held.GetConnectivityArray()).astype(np.int64)
+
+
+def _polyhedra(given: Any, types: UInt8) -> Polyhedra | None:
+    """The faces of polyhedra, by numbers (VTK 9.4 and later) or as streams."""
+    at = np.flatnonzero(types == POLYHEDRON)
+    if not len(at):
+        return None
+    if hasattr(given, "GetPolyhedronFaces"):
+        offsets, faces = _list_of(given.GetPolyhedronFaceLocations())
+        return from_faces(offsets, faces, *_list_of(given.GetPolyhedronFaces())).select(at)
+    stream, starts = _numpy(given.GetFaces()).astype(np.int64), _numpy(given.GetFaceLocations()).astype(np.int64)[at]
+    return from_streams(stream, starts, np.concatenate([starts[1:], [len(stream)]]))
 
 
 def _arrays(group: Any, left: LeftBehind) -> dict[str, DataArray]:

@@ -178,6 +178,20 @@ class TestVtk:
         assert [(part.name, part.triangles) for part in found.parts] == [("lid", (0, 20)), ("Körper", (20, 48))]
         assert not found.fields and not found.attributes and not any("part" in name for name in found.not_carried)
 
+    def test_polyhedra_have_a_surface(self) -> None:
+        from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
+        from vtkmodules.vtkCommonDataModel import VTK_POLYHEDRON, vtkUnstructuredGrid
+
+        grid, points, stream = vtkUnstructuredGrid(), vtkPoints(), vtkIdList()
+        for point in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]:
+            points.InsertNextPoint(point)
+        for number in [4, 3, 0, 2, 1, 3, 0, 1, 3, 3, 1, 2, 3, 3, 2, 0, 3]:
+            stream.InsertNextId(number)
+        grid.SetPoints(points)
+        grid.InsertNextCell(VTK_POLYHEDRON, stream)
+        found = gvpipe.from_vtk(grid)
+        assert len(found.faces) == 4 and found.not_carried == ("polyhedra but for their surface",)
+
     def test_pyvista_s_blocks_have_their_names(self) -> None:
         pyvista = pytest.importorskip("pyvista")
         blocks = pyvista.MultiBlock({"plate": pyvista.Plane(), "ball": pyvista.Sphere()})
