@@ -48,6 +48,12 @@ class Polyhedra:
         """The same with point ``number[p]`` in place of p."""
         return Polyhedra(self.counts, self.sizes, number[self.nodes])
 
+    def points(self) -> tuple[Int64, Int64]:
+        """How many points each polyhedron has ``(n,)``, and these, each once, rising, polyhedron after polyhedron."""
+        owners = np.repeat(np.repeat(np.arange(len(self.counts)), self.counts), self.sizes)
+        pairs = np.unique(np.stack([owners, self.nodes], axis=1), axis=0)
+        return np.bincount(pairs[:, 0], minlength=len(self.counts)), np.ascontiguousarray(pairs[:, 1])
+
     def equals(self, other: Polyhedra) -> bool:
         """Whether both are the same."""
         pairs = ((self.counts, other.counts), (self.sizes, other.sizes), (self.nodes, other.nodes))

@@ -140,10 +140,12 @@ def load_legacy(path: Path) -> Dataset:
     head = data.split(b"\n", 3)
     if not head[0].startswith(b"# vtk DataFile Version") or len(head) < 4:
         raise ValueError("it does not start with '# vtk DataFile Version', or is cut short")
-    form = head[2].strip().upper()
-    if form not in (b"ASCII", b"BINARY"):
+    start = sum(len(line) + 1 for line in head[:2])
+    line = LINE.match(data, SPACE.match(data, start).end())  # type: ignore[union-attr]  # both match anything
+    form = b"" if line is None else line[0].strip().upper()
+    if line is None or form not in (b"ASCII", b"BINARY"):
         raise ValueError(f"its third line is {form[:40].decode('latin-1')!r}; ASCII or BINARY is needed")
-    cursor = _Cursor(data, sum(len(line) + 1 for line in head[:3]), form == b"BINARY")
+    cursor = _Cursor(data, line.end(), form == b"BINARY")
     parsed, kind = _Parsed(), ""
     where, rows = "", 0
     while word := cursor.word().upper():
@@ -211,14 +213,13 @@ def _with_polyhedra(types: UInt8, offsets: Int64, nodes: Int64) -> Cells:
         return Cells(types, offsets, nodes)  # which says what is wrong
     is_polyhedron = types == POLYHEDRON
     polyhedra = from_streams(nodes, offsets[:-1][is_polyhedron], offsets[1:][is_polyhedron])
-    corners = np.repeat(np.arange(len(polyhedra.counts)), polyhedra.counts)
-    pairs = np.unique(np.stack([np.repeat(corners, polyhedra.sizes), polyhedra.nodes], axis=1), axis=0)
+    counts, points = polyhedra.points()
     sizes = np.diff(offsets)
-    sizes[is_polyhedron] = np.bincount(pairs[:, 0], minlength=len(polyhedra.counts))
+    sizes[is_polyhedron] = counts
     ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
     made = np.empty(ends[-1], np.int64)
     own = np.repeat(is_polyhedron, sizes)
-    made[own] = pairs[:, 1]
+    made[own] = points
     made[~own] = nodes[np.repeat(~is_polyhedron, np.diff(offsets))]
     return Cells(types, ends, made, polyhedra)
 

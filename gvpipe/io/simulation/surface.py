@@ -86,15 +86,15 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
     if not groups:
         raise ValueError(f"its {len(cells.types)} cells have no surface; a mesh with triangles or volume cells is needed")
     counts, nodes, owners = _in_order(groups)
-    used = np.arange(len(points)) if not solid else np.unique(nodes)
+    used = np.arange(len(points)) if not solid else np.flatnonzero(_is_met(nodes, len(points)))
     number = np.zeros(len(points), np.int64)
     number[used] = np.arange(len(used))
     faces = number[nodes][fan(counts)].astype(np.int32)
     left = _left_behind(cells, n_covered)
     if solid:
-        left.add("points of no cell", len(points) - len(np.unique(cells.nodes)))
+        left.add("points of no cell", len(points) - int(_is_met(cells.nodes, len(points)).sum()))
     without_inside = left.names
-    _add_inside(left, cells, used)
+    _add_inside(left, cells, used, len(points))
     return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), left.names, without_inside)
 
 
@@ -119,12 +119,20 @@ def _left_behind(cells: Cells, n_covered: int) -> LeftBehind:
     return left
 
 
-def _add_inside(left: LeftBehind, cells: Cells, used: Int64) -> None:
+def _add_inside(left: LeftBehind, cells: Cells, used: Int64, n_points: int) -> None:
     """Note what lies inside of the surface."""
     is_solid = np.isin(cells.types, list(VOLUMES))
     left.add(VOLUME_CELLS, int(is_solid.sum()))
-    nodes = np.unique(cells.nodes[np.repeat(is_solid, cells.sizes)])
-    left.add(INNER_POINTS, len(np.setdiff1d(nodes, used, assume_unique=True)))
+    is_inner = _is_met(cells.nodes[np.repeat(is_solid, cells.sizes)], n_points)
+    is_inner[used] = False
+    left.add(INNER_POINTS, int(is_inner.sum()))
+
+
+def _is_met(nodes: Int64, n_points: int) -> Bool:
+    """``(N,)`` whether each point is among the nodes."""
+    is_met = np.zeros(n_points, bool)
+    is_met[nodes] = True
+    return is_met
 
 
 def _flat_faces(cells: Cells) -> list[_Faces]:

@@ -238,7 +238,7 @@ def _name_of(given: Any, number: int) -> str:
 def _dataset(given: Any) -> Dataset:
     kind = str(given.GetClassName())
     wrapped = next((base for base in SPACES if given.IsA(base)), None)
-    dimensions = tuple(given.GetDimensions()) if hasattr(given, "GetDimensions") else None
+    dimensions = _dimensions(given)
     if wrapped:
         converter = getattr(import_module("vtkmodules.vtkFiltersGeneral"), SPACES[wrapped])()
         converter.SetInputData(given)
@@ -265,6 +265,18 @@ def _texts(group: Any) -> dict[str, Callable[[], list[str]]]:
         return [str(array.GetValue(k)) for k in range(array.GetNumberOfValues())]
 
     return {str(each.GetName()): partial(values, each) for each in texts}
+
+
+def _dimensions(given: Any) -> Sequence[int] | None:
+    """Points along x, y and z of a data set that has them."""
+    if not hasattr(given, "GetDimensions"):
+        return None
+    try:
+        return tuple(given.GetDimensions())
+    except TypeError:  # vtkStructuredGrid has no such form
+        found = [0, 0, 0]
+        given.GetDimensions(found)
+        return found
 
 
 def _cells(given: Any, dimensions: Sequence[int] | None) -> Cells:

@@ -178,6 +178,18 @@ class TestVtk:
         assert [(part.name, part.triangles) for part in found.parts] == [("lid", (0, 20)), ("Körper", (20, 48))]
         assert not found.fields and not found.attributes and not any("part" in name for name in found.not_carried)
 
+    def test_structured_grids(self) -> None:
+        """Of CGNS files, for one; their number of points is asked in another way."""
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkStructuredGrid
+
+        grid, points = vtkStructuredGrid(), vtkPoints()
+        for k in range(27):
+            points.InsertNextPoint(k % 3, k // 3 % 3, k // 9)
+        grid.SetDimensions(3, 3, 3)
+        grid.SetPoints(points)
+        assert gvpipe.from_vtk(grid).n_vertices == 26
+
     def test_polyhedra_have_a_surface(self) -> None:
         from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
         from vtkmodules.vtkCommonDataModel import VTK_POLYHEDRON, vtkUnstructuredGrid
