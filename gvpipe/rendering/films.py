@@ -60,13 +60,13 @@ class Film:
         shown: whose values the colours show, in place of materials.
         legend: ``(H, w, 3) uint8``, a strip at the left.
         follow: whether the camera goes with the mesh.
-        cut: by a plane, in place of the renderer's mesh.
+        cut: by a plane, in place of the renderer; one of both is there.
     """
 
     sequence: MeshSequence
     frames: list[int]
     camera: Camera
-    renderer: Renderer
+    renderer: Renderer | None
     turntable: bool = False
     shown: ColourMap | None = None
     legend: UInt8 | None = None
@@ -104,7 +104,8 @@ class Film:
 
     def __getitem__(self, k: int) -> UInt8:
         frame = self.frames[k]
-        if self.cut is not None:
+        if self.renderer is None:
+            assert self.cut is not None
             picture = self.cut.draw(frame, self.camera_of(k))
         else:
             values = self.shown.values(frame) if self.shown else None
@@ -186,7 +187,7 @@ def write_pictures(
     film = _plan(sequence, suffix, options, reference)
     with unnamed_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
-    return film.renderer.notes
+    return () if film.renderer is None else film.renderer.notes
 
 
 def check_output(path: Path, options: PictureOptions) -> str:
@@ -240,9 +241,10 @@ def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, referenc
     )
     samples = STILL_SAMPLES if suffix == STILL else FILM_SAMPLES
     plain = options.plain or shown is not None
-    renderer = Renderer.of(sequence, (across, height), options.shading, samples, plain=plain, colors=colors)
-    cut = None
-    if options.cut is not None:
+    renderer = cut = None
+    if options.cut is None:
+        renderer = Renderer.of(sequence, (across, height), options.shading, samples, plain=plain, colors=colors)
+    else:
         if reference is not None:
             raise InputError("a plane and errors are asked for; leave one of both out")
         look = CutLook((across, height), options.shading, samples, colors)
