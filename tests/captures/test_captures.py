@@ -230,3 +230,13 @@ def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"shot 0 \(frames 0 to 2\): "):
         gvpipe.encode(sheets(), tmp_path / "a.mp4", target_bpvf=0.001)
     assert not list(tmp_path.iterdir())
+
+
+def test_among_many(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "many" / "sheets"
+    folder.mkdir(parents=True)
+    write_objs(folder)
+    ended = run("encode-all", tmp_path / "many", tmp_path / "out", "--json")
+    assert ended.status == 0 and json.loads(ended.out)["encoded"] == 1
+    ended = run("pack", tmp_path / "out", tmp_path / "s-%05d.tar")
+    assert ended.status == 1 and "a capture of 3 shots" in ended.err
