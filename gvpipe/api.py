@@ -282,7 +282,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     else:  # positions before faces: the video decodes on other threads while the mesh does on this one
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
-    return dataclasses.replace(whole, positions=positions, fields=fields)
+    return dataclasses.replace(whole, positions=positions, fields=fields, sound=whole.sound_of(start, stop))
 
 
 def restream(

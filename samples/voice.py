@@ -43,5 +43,6 @@ def write_voice(path: Path) -> None:
 
 def _wave(phase: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """A wave like a sine, of parabolas, -32768..32767."""
-    x = phase % TURN - TURN // 2
-    return x * (TURN // 2 - np.abs(x)) * 4 // (TURN // 2)
+    x: npt.NDArray[np.int64] = phase % TURN - TURN // 2
+    result: npt.NDArray[np.int64] = x * (TURN // 2 - np.abs(x)) * 4 // (TURN // 2)
+    return result

@@ -265,7 +265,7 @@ def decode(
         silent = sequence.with_sound(None)
         noticed = [*said, *files.write(silent.local() if local else silent, path, start, found, compress)]
         sound, heard = write_beside(sequence, sound_target, audio_out)
-    noticed += heard
+    noticed += heard + [note for note in player.bitstream.lost if note not in noticed]
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
     noticed += [UNFINISHED] if player.bitstream.is_unfinished and UNFINISHED not in noticed else []

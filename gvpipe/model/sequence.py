@@ -294,11 +294,11 @@ class MeshSequence:
         fields = {name: each.part(start, stop) for name, each in self.fields.items()}
         metadata = self.metadata.of_frames(start, stop, self.n_frames, self.fps)
         volume = None if self.volume is None else self.volume.part(start, stop)
-        beside = {"fields": fields, "metadata": metadata, "volume": volume, "sound": self._sound_of(start, stop)}
+        beside = {"fields": fields, "metadata": metadata, "volume": volume, "sound": self.sound_of(start, stop)}
         return self._derived(Span(self.read, start, *size), exact, **beside)
 
-    def _sound_of(self, start: int, stop: int) -> Sound | None:
-        """What is heard with some frames; with the last one, all that follows."""
+    def sound_of(self, start: int, stop: int) -> Sound | None:
+        """What is heard with frames ``start`` to ``stop``; with the last one, all that follows."""
         end = None if stop >= self.n_frames else stop / self.fps
         return None if self.sound is None else self.sound.part(start / self.fps, end)
 
