@@ -162,10 +162,12 @@ def convert(
     except TopologyChange:
         if skin or lod or clip == ALL:
             raise
+        from gvpipe.cli.audio_options import NO_SOUND
+
         with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
             capture = files.read_capture(given, clip=clip, mesh=mesh, **how).part(first, last)
             asked = {"parts": parts, "compress": compress, "fps": fps}
-            write_shots(capture, source, target, path, first, asked, progress, out)
+            write_shots(capture, source, target, path, first, asked, progress, out, (None, NO_SOUND))
         return
     for note in noticed:
         out.note(note)
