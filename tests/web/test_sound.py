@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import wave
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ TOOLS = """const element = document.querySelector("geometry-video");
     const on = (name) => new Promise((resolve) => element.addEventListener(name, resolve, { once: true }));
     const sound = () => window.heard.at(-1);
     const off = () => element.currentFrame - sound().currentTime * 24;
+    const moved = async () => { while (element.currentFrame < 4) await wait(20); };
     const look = async (ms) => {
       const found = [];
       for (const end = performance.now() + ms; performance.now() < end; await wait(50)) found.push(off());
@@ -40,7 +42,9 @@ TOOLS = """const element = document.querySelector("geometry-video");
 def driver(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     if missing := browsers.missing(request.param):
         pytest.skip(missing)
-    with browsers.browser(request.param, tmp_path_factory.mktemp("profile")) as running:
+    profile = tmp_path_factory.mktemp("profile")
+    server = browsers.sound_server(tmp_path_factory.mktemp("sound")) if request.param == "firefox" else nullcontext({})
+    with server as more, browsers.browser(request.param, profile, more=more) as running:
         running.name_of_test = request.param
         yield running
 
@@ -176,7 +180,7 @@ def test_muting(driver: Any, player: Callable[..., Any], site: tuple[Path, str],
         const button = element.shadowRoot.querySelector('[data-act="mute"]');
         const shown = [button.hidden, button.ariaLabel];
         await element.play();
-        await wait(400);
+        await moved();
         const state = [element.currentFrame > 3, sound().paused, element.getAttribute("muted")];
         return [log, wrong, shown, ...state, element.video.sound];""",
         path.name,
@@ -235,7 +239,7 @@ def test_files_without_sound_and_with_a_damaged_one(
             await on("ready");
             const hidden = element.shadowRoot.querySelector('[data-act="mute"]').hidden;
             await element.play();
-            await wait(300);
+            await moved();
             return [hidden, element.video.sound, element.currentFrame > 2, window.heard.length,
               element.shadowRoot.querySelector(".notes").textContent];""",
             name,
