@@ -94,6 +94,7 @@ def export_html(
     log: bool = False,
     speed: float = 1.0,
     warp: str | None = None,
+    clip: str | None = None,
     camera: str | tuple[float, float] | None = None,
     shading: str = "smooth",
     unlimited: bool = False,
@@ -115,6 +116,8 @@ def export_html(
         log: let colours follow the logarithm of the field; what is not above 0 is grey.
         speed: 0.0625 to 16; 1 is the video's own.
         warp: ``"NAME"`` or ``"NAME:SCALE"``: a field of vectors on vertices that moves them, so many times as far.
+        clip: a plane that cuts the mesh: ``"x=0.3"`` (model units), ``"y=30%"`` (of the first frame's box), ``"-x=0.3"``
+            (what lies below is left out). The section of a volume is filled.
         camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
         shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
@@ -148,6 +151,7 @@ def export_html(
         log=log,
         speed=speed,
         warp=warp,
+        clip=clip,
         camera=camera,
         shading=shading,
     )

@@ -132,6 +132,8 @@ export class GeometryVideo {
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
+    /** What positions count from, model units: a point of the source. */
+    this.origin = header.origin ?? [0, 0, 0];
     /** Of the whole file. */
     this.byteLength = byteLength;
     this.#repeated = repeated;
@@ -360,6 +362,8 @@ export class GeometryVideo {
     this.images = asset.images;
     /** (P) corners of each polygon, or null if all are triangles. */
     this.polygons = asset.polygons;
+    /** What lies inside of the surface (`volume/volume.js`), or null. */
+    this.volume = asset.volume;
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
     this.notes = [...asset.notes, ...this.#soundNotes];
