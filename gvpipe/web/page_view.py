@@ -41,6 +41,7 @@ class PageView:
         clip: a plane that cuts the mesh, ``x=0.3`` in model units, or None.
         camera: azimuth and elevation, degrees, or None for the player's own.
         shading: one of `gvpipe.rasterizer.renderer.SHADINGS`.
+        muted: whether it is silent until its reader asks for the sound: browsers start silent films alone.
     """
 
     field: str | None = None
@@ -52,6 +53,7 @@ class PageView:
     clip: str | None = None
     camera: tuple[float, float] | None = None
     shading: str = SHADINGS[0]
+    muted: bool = False
 
     def attributes(self) -> str:
         """Attributes of the element, each with a space before it; nothing where all is as the player has it."""
@@ -66,7 +68,8 @@ class PageView:
             "camera": _numbers(self.camera),
             "shading": None if self.shading == SHADINGS[0] else self.shading,
         }
-        return "".join(f' {name}="{html.escape(value)}"' for name, value in values.items() if value is not None)
+        given = "".join(f' {name}="{html.escape(value)}"' for name, value in values.items() if value is not None)
+        return given + (" muted" if self.muted else "")
 
 
 def page_view(
