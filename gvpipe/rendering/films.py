@@ -75,6 +75,11 @@ class Film:
     cut: CutScene | None = None
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know, a line each."""
+        return () if self.renderer is None else self.renderer.notes
+
+    @property
     def fps(self) -> float:
         """Frames per second."""
         return self.sequence.fps
@@ -192,7 +197,7 @@ def write_pictures(
     film = plan_film(sequence, drawn_frames(sequence, options.frame, suffix, options.turntable), suffix, options, reference)
     with unnamed_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
-    return () if film.renderer is None else film.renderer.notes
+    return film.notes
 
 
 def check_output(path: Path, options: PictureOptions) -> str:
