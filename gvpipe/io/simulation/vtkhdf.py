@@ -244,10 +244,14 @@ class VtkHdfSteps:
             raise ValueError(f"it has sizes of {len(cells_of_part)} parts, {stop} are needed")
         cell = self._offset("CellOffsets", step, int(cells_of_part[:first].sum()), column)
         node = self._offset("ConnectivityIdOffsets", step, int(nodes_of_part[:first].sum()), column)
+        before = first  # parts whose offsets come first
+        if len(self._file.dataset(f"{self._root}/{group}Offsets")) < cells_of_part.sum() + len(cells_of_part):
+            ends = np.concatenate([[0], np.cumsum(cells_of_part)])  # steps share their cells, which are there once
+            before = int(np.searchsorted(ends, cell))
         pieces = []
         for number in range(first, stop):
             n_cells, n_nodes = int(cells_of_part[number]), int(nodes_of_part[number])
-            start = cell + number  # each part has one offset more than cells
+            start = cell + before + number - first  # each part has one offset more than cells
             offsets = self._file.read(f"{self._root}/{group}Offsets", start, start + n_cells + 1).astype(np.int64).reshape(-1)
             nodes = self._file.read(f"{self._root}/{group}Connectivity", node, node + n_nodes).astype(np.int64).reshape(-1)
             types = (
