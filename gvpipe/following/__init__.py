@@ -1,0 +1,6 @@
+"""Following one mesh through frames whose connectivity changes."""
+
+from gvpipe.following.follow import MeshFrames, follow
+from gvpipe.following.runs import Run
+
+__all__ = ["MeshFrames", "Run", "follow"]
