@@ -2,29 +2,28 @@
 
 Both ways are measured, from each surface to the other, and the larger counts. Distances are exact, from points to triangles:
 P. Cignoni, C. Rocchini and R. Scopigno, Metro: measuring error on simplified surfaces, 1998; N. Aspert, D. Santa-Cruz and
-T. Ebrahimi, MESH: measuring errors between surfaces using the Hausdorff distance, 2002. D1 and D2 are those of MPEG's
-test model of V-DMC, between point clouds. Formulas and sources are in ``docs/metrics.md``.
+T. Ebrahimi, MESH: measuring errors between surfaces using the Hausdorff distance, 2002. D1 and D2 are MPEG's
+(`gvpipe.metrics.point_clouds`). Formulas and sources are in ``docs/metrics.md``.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gvpipe.foundation.arrays import Float64, Floats, Integers
 from gvpipe.foundation.errors import InputError
-from gvpipe.metrics.surface_samples import Samples, grid_step, sample_by_area, sample_on_grid, triangle_normals
+from gvpipe.metrics.point_clouds import GRID, Cloud, cloud_errors, make_clouds, psnr
+from gvpipe.metrics.surface_samples import sample_by_area
 from gvpipe.metrics.triangle_tree import TriangleTree, build_tree, find_nearest
 from gvpipe.metrics.vertex_errors import ratio
+from gvpipe.runtime.ahead import beside
 
 SAMPLES = 100_000  # points of each surface
-GRID = 1024  # lines along the longest side of the box, as MPEG's software has
 QUANTILE = 0.99
-BEST_PSNR = 99.99  # dB, as MPEG's software writes for more
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,10 @@ class SurfaceErrors:
     d1_psnr: float | None
     d2_mse: float | None
     d2_psnr: float | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
+        return asdict(self)
 
 
 class Scale(NamedTuple):
@@ -131,11 +134,12 @@ def surface_distances(
 def measure(
     one: Surface, other: Surface, scale: Scale, *, samples: int = SAMPLES, seed: int = 0, grid: int = GRID
 ) -> SurfaceErrors:
-    """As `surface_distances`, of two `Surface`, by a given scale."""
-    there = _distances(one, other, samples, seed)
-    back = _distances(other, one, samples, seed)
-    rms, p99, largest = np.maximum(there, back).tolist()
-    d1, d2 = _cloud_errors(one, other, scale, grid) if grid else (None, None)
+    """As `surface_distances`, of two `Surface`, by a given scale. Each way has a thread."""
+    clouds = make_clouds(one.corners, other.corners, scale.low, scale.peak, grid) if grid else None
+    with beside(lambda: _one_way(one, other, samples, seed, clouds)) as there:
+        back = _one_way(other, one, samples, seed, clouds and clouds[::-1])
+        rms, p99, largest, *d1_d2 = np.maximum(there(), back).tolist()
+    d1, d2 = (None if math.isnan(each) else each for each in d1_d2)
     return SurfaceErrors(
         rms,
         ratio(rms, scale.diagonal),
@@ -157,38 +161,13 @@ def scale_of(points: Float64) -> Scale:
     return Scale(float(np.linalg.norm(sides)), low, float(sides.max()))
 
 
-def psnr(mse: float | None, peak: float) -> float | None:
-    """``10 log10(3 peak^2 / mse)``, dB, at most 99.99; None if there is no error to measure, or no peak."""
-    if mse is None or not peak > 0:
-        return None
-    return min(BEST_PSNR, 10 * math.log10(3 * peak**2 / mse)) if mse > 0 else BEST_PSNR
-
-
-def _distances(source: Surface, target: Surface, samples: int, seed: int) -> Float64:
-    """Root mean square, quantile and largest distance of one way ``(3,)``, at samples and vertices."""
+def _one_way(source: Surface, target: Surface, samples: int, seed: int, clouds: tuple[Cloud, Cloud] | None) -> Float64:
+    """Root mean square, quantile and largest distance at samples and vertices, D1 and D2 ``(5,)``; NaN: not measured."""
     points = np.concatenate([sample_by_area(source.corners, samples, seed).points, source.used])
     distances = find_nearest(target.tree, points).distances
-    return np.array([math.sqrt(float(np.square(distances).mean())), np.quantile(distances, QUANTILE), distances.max()])
-
-
-def _cloud_errors(one: Surface, other: Surface, scale: Scale, grid: int) -> tuple[float | None, float | None]:
-    """Mean squared distances from point to point and from point to plane, of both ways the larger; None if a cloud is empty."""
-    step = grid_step([one.corners, other.corners], scale.peak, grid)
-    clouds = [sample_on_grid(each.corners, scale.low, step) for each in (one, other)]
-    if not all(len(cloud.points) for cloud in clouds):
-        return None, None
-    there = _cloud_distances(clouds[0], clouds[1], triangle_normals(other.corners))
-    back = _cloud_distances(clouds[1], clouds[0], triangle_normals(one.corners))
-    return max(there[0], back[0]), max(there[1], back[1])
-
-
-def _cloud_distances(source: Samples, target: Samples, normals: Float64) -> tuple[float, float]:
-    """Mean squared distance to the nearest point, and along the normal there, of one way."""
-    tree = cKDTree(target.points, balanced_tree=False)  # a third faster
-    nearest = np.asarray(tree.query(source.points)[1], np.intp)
-    apart = source.points - target.points[nearest]
-    along = np.einsum("pc,pc->p", apart, normals[target.triangles[nearest]])
-    return float(np.einsum("pc,pc->", apart, apart)) / len(apart), float(np.square(along).mean())
+    rms = math.sqrt(float(np.square(distances).mean()))
+    d1, d2 = cloud_errors(*clouds) if clouds else (math.nan, math.nan)
+    return np.array([rms, np.quantile(distances, QUANTILE), distances.max(), d1, d2])
 
 
 def _as_points(given: Any, name: str) -> Float64:

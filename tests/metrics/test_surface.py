@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.foundation.errors import InputError
 from gvpipe.metrics import surface_samples
-from gvpipe.metrics.surface import BEST_PSNR, Scale, scale_of, surface_distances
+from gvpipe.metrics.point_clouds import BEST_PSNR
+from gvpipe.metrics.surface import Scale, scale_of, surface_distances
 from gvpipe.metrics.surface_samples import grid_step, sample_by_area, sample_on_grid, triangle_normals
 from gvpipe.metrics.triangle_search import squared_distances
 from gvpipe.metrics.triangle_tree import build_tree, find_nearest
