@@ -166,7 +166,7 @@ def _one_way(source: Surface, target: Surface, samples: int, seed: int, clouds: 
     points = np.concatenate([sample_by_area(source.corners, samples, seed).points, source.used])
     distances = find_nearest(target.tree, points).distances
     rms = math.sqrt(float(np.square(distances).mean()))
-    d1, d2 = cloud_errors(*clouds) if clouds else (math.nan, math.nan)
+    d1, d2 = cloud_errors(*clouds, target.tree) if clouds else (math.nan, math.nan)
     return np.array([rms, np.quantile(distances, QUANTILE), distances.max(), d1, d2])
 
 

@@ -13,6 +13,7 @@ import pytest
 from gltf_files import two_clips
 
 import gvpipe
+from gvpipe.metrics import surface_comparison
 from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -73,8 +74,12 @@ def test_clips(run: Run, tmp_path: Path) -> None:
     assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err
 
 
-def test_surfaces(run: Run, pair: tuple[Path, Path], sequence: MeshSequence, tmp_path: Path) -> None:
+def test_surfaces(
+    run: Run, pair: tuple[Path, Path], sequence: MeshSequence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Without a last triangle vertices do not correspond; a note says so, and surfaces are compared."""
+    monkeypatch.setattr(surface_comparison, "SAMPLES", 500)
+    monkeypatch.setattr(surface_comparison, "GRID", 64)
     gvpipe.write(replace(gvpipe.read(pair[1]), faces=sequence.faces[:-1]), tmp_path / "c.npz")
     frames = ("--frames", "0:2")
     both = json.loads(run("compare", *pair, "--surface", *frames, "--json").out)

@@ -87,6 +87,21 @@ def test_parts_are_of_the_given_scale_and_a_point_has_none() -> None:
     assert collapsed.d1_mse is collapsed.d1_psnr is collapsed.d2_mse is None  # no line meets a point
 
 
+def test_far_from_the_other_cloud_the_surface_stands_for_it() -> None:
+    """The middle of a tube is as far from all of it: the ratios of far and near searches are alike."""
+    x, y = np.meshgrid(np.arange(24) * np.pi / 12, [0.0, 1.0], indexing="ij")
+    tube = np.stack([np.cos(x), np.sin(x), y], axis=2).reshape(-1, 3)
+    start = 2 * np.arange(24)
+    faces = np.concatenate(
+        [np.stack([start, (start + 2) % 48, start + 1], 1), np.stack([(start + 2) % 48, (start + 3) % 48, start + 1], 1)]
+    )
+    thin = tube * [0.01, 0.01, 1]
+    far = surface_distances(thin, faces, tube, faces, samples=100, grid=200)  # a line is 0.01, or 0.005
+    near = surface_distances(thin, faces, tube, faces, samples=100, grid=14)
+    assert far.d1_mse == pytest.approx(1, rel=0.03) and near.d1_mse == pytest.approx(1, rel=0.05)
+    assert far.d2_mse is not None and far.d1_mse is not None and 0.95 < far.d2_mse <= far.d1_mse
+
+
 # What is sampled
 
 
