@@ -8,8 +8,9 @@ Three things differ, of which the first two save most of the time:
 
 - Every k-th point of a cloud is measured, so that there are at most `QUERIES`, against all points of the other. That changed
   ratios by up to 0.02 dB.
-- Where no point is within `FAR` lines, the nearest point of the surface stands for that of its cloud. Its squared distance
-  is less by less than 1 % on a smooth surface. Searching among points takes a thousand times longer where many are nearly as near.
+- Where no point is within `FAR` lines, the nearest point of the surface stands for that of its cloud. On a
+  smooth surface its squared distance is less by less than 1 %. Searching among points takes a thousand times longer where
+  many are nearly as near.
 - Of several points that are equally near, one counts here; MPEG's software takes the mean of their squared D2.
 """
 
