@@ -439,18 +439,23 @@ def compare(
     reference: MeshSequence | Player | Source,
     distorted: MeshSequence | Player | Source,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    surface: bool | None = None,
 ) -> Comparison:
-    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+    """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
     Args:
         reference: the original, a player, or what `read` takes; lengths are divided by its size. Where one of both has a
             volume, the other is read with what lies inside of it.
-        distorted: as many frames and vertices, the same triangles in any order; or what `read` takes, such as a geometry video.
+        distorted: as many frames, of the same vertices and triangles in any order, or of others; or what `read` takes, such as
+            a geometry video.
         progress: called with (frames done, frames in all) after each block.
+        surface: True: the distance of the surfaces too, whose triangles need not correspond; False: never; None: where vertices
+            do not correspond.
 
     Raises:
-        InputError: one cannot be read, or the two differ in their number of frames or vertices or in their triangles, so that
-            vertices do not correspond.
+        InputError: one cannot be read, they differ in their number of frames, vertices do not correspond and ``surface`` is
+            False, or surfaces are needed and one side has no triangles.
         TypeError: one of them is neither a sequence, a player nor a path.
 
     Examples:
@@ -472,7 +477,7 @@ def compare(
     if any(each.volume is not None for each in both):
         pairs = zip(given.values(), both, strict=True)
         both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-    return measure(both[0], both[1], progress)
+    return measure(both[0], both[1], progress, surface=surface)
 
 
 def _as_sequence(given: MeshSequence | Player | Source, volume: bool = False) -> MeshSequence:

@@ -13,6 +13,7 @@ import pytest
 from gltf_files import two_clips
 
 import gvpipe
+from gvpipe.metrics import surface_comparison
 from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -71,3 +72,28 @@ def test_clips(run: Run, tmp_path: Path) -> None:
     assert max(errors(run, tmp_path / "run.npz", tmp_path / "a.glb", "--other-clip", "Run")) == 0
     ended = run("compare", tmp_path / "run.npz", tmp_path / "a.glb", "--other-clip", "Rum")
     assert ended.status == 1 and "there are: 'Walk', 'Run'" in ended.err
+
+
+def test_surfaces(
+    run: Run, pair: tuple[Path, Path], sequence: MeshSequence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a last triangle vertices do not correspond; a note says so, and surfaces are compared."""
+    monkeypatch.setattr(surface_comparison, "SAMPLES", 500)
+    monkeypatch.setattr(surface_comparison, "GRID", 64)
+    gvpipe.write(replace(gvpipe.read(pair[1]), faces=sequence.faces[:-1]), tmp_path / "c.npz")
+    frames = ("--frames", "0:2")
+    both = json.loads(run("compare", *pair, "--surface", *frames, "--json").out)
+    assert both["surface"]["max"] <= both["max"] and both["unpaired"] == ""
+    assert both["surface"]["rms_diag"] == pytest.approx(both["surface"]["rms"] / both["surface"]["diagonal"])
+    ended = run("compare", pair[0], tmp_path / "c.npz", *frames, "--json")
+    alone = json.loads(ended.out)
+    assert alone["rmse"] is None and alone["frames"] == [] and "triangles" in alone["unpaired"]
+    assert len(alone["surface"]["frames"]) == 2
+    assert alone["surface"]["frames"][1]["d1_psnr"] < alone["surface"]["frames"][0]["d1_psnr"]
+    assert "Note: surfaces alone are compared: " in ended.err
+    shown = run("compare", pair[0], tmp_path / "c.npz", *frames).out
+    assert shown.splitlines()[0].startswith("surface rms ") and "rmse" not in shown
+    assert run("compare", pair[0], tmp_path / "c.npz", "--frames", "0:1").status == 0
+    gvpipe.write(gvpipe.read(pair[0], frames=(0, 3)), tmp_path / "d.npz")
+    ended = run("compare", tmp_path / "c.npz", tmp_path / "d.npz")
+    assert ended.status == 1 and "equal numbers are needed" in ended.err
