@@ -1,7 +1,7 @@
 """Kernels: closest points on triangles, by a tree of boxes.
 
-The tree is complete and implicit: node n has children 2n + 1 and 2n + 2, and the last level are leaves of `LEAF` triangles each, in
-the order along a Morton curve. A leaf without triangles has an empty box (low > high), which no query enters.
+The tree is complete and implicit: node n has children 2n + 1 and 2n + 2. The last level: leaves of `LEAF` triangles each, along
+a Morton curve. A leaf without triangles has an empty box (low > high), which no query enters.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ def _box_distance(bounds: Float64, node: int, x: float, y: float, z: float) -> f
     dx = max(bounds[node, 0] - x, x - bounds[node, 3], 0.0)
     dy = max(bounds[node, 1] - y, y - bounds[node, 4], 0.0)
     dz = max(bounds[node, 2] - z, z - bounds[node, 5], 0.0)
-    return dx * dx + dy * dy + dz * dz
+    squared: float = dx * dx + dy * dy + dz * dz
+    return squared
 
 
 @compiled
@@ -94,11 +95,14 @@ def closest_on_triangle(c: Float64, x: float, y: float, z: float, weights: Float
         v, w = vb / (va + vb + vc), vc / (va + vb + vc)
     weights[0], weights[1], weights[2] = 1.0 - v - w, v, w
     dx, dy, dz = apx - v * abx - w * acx, apy - v * aby - w * acy, apz - v * abz - w * acz
-    return dx * dx + dy * dy + dz * dz
+    squared: float = dx * dx + dy * dy + dz * dz
+    return squared
 
 
 @compiled
-def find_closest(tree: Boxes, points: Float64, normals: Float64, agreement: float, reach: Float64, triangles: Int64, weights: Float64) -> None:
+def find_closest(
+    tree: Boxes, points: Float64, normals: Float64, agreement: float, reach: Float64, triangles: Int64, weights: Float64
+) -> None:
     """Closest points on the triangles whose normals agree.
 
     Args:

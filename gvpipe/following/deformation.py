@@ -1,7 +1,7 @@
 """Least squares for the vertices of one mesh: samples near a surface, edges that turn and do not stretch.
 
-The unknowns are positions ``(V, 3)``. Samples of a surface add terms along a normal, and weaker ones in all directions. Each edge
-adds ``stiffness |x_i - x_j - R e_ij|^2`` with the edge ``e_ij`` of a shape at rest, turned by the mean of its vertices' rotations.
+The unknowns are positions ``(V, 3)``. Samples of a surface add terms along a normal, and weaker ones in all directions. Each
+edge adds ``stiffness |x_i - x_j - R e_ij|^2``: ``e_ij`` is the edge of a shape at rest, R the mean of its vertices' rotations.
 O. Sorkine and M. Alexa, As-rigid-as-possible surface modeling, 2007, with weights of 1.
 """
 

@@ -7,17 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.following.surface import Surface
+from gvpipe.metrics.surface import Scale, measure
 
-LEAST_SAMPLES, MOST_SAMPLES = 10_000, 100_000
-PER_TRIANGLE = 1  # samples for each triangle of the finer surface, within these bounds
+LEAST_SAMPLES, MOST_SAMPLES = 10_000, 100_000  # of each surface; between them, one for each triangle of the finer one
 
 
 class SurfaceError(NamedTuple):
-    """Parts of a diagonal.
+    """Parts of a diagonal, of both ways the larger.
 
     Args:
-        rms: root mean square at samples, of the worse direction.
-        largest: at samples and vertices, in both directions.
+        rms: root mean square at samples and vertices.
+        largest: at samples and vertices.
     """
 
     rms: float
@@ -26,11 +26,6 @@ class SurfaceError(NamedTuple):
 
 def surface_error(one: Surface, other: Surface, diagonal: float) -> SurfaceError:
     """The distance between two surfaces, neither of them empty, as parts of ``diagonal``, which is in model units."""
-    n = min(max(LEAST_SAMPLES, PER_TRIANGLE * max(len(one.faces), len(other.faces))), MOST_SAMPLES)
-    rms, largest = 0.0, 0.0
-    for a, b in ((one, other), (other, one)):
-        samples = b.closest.find(a.sample(n).of(a.positions, a.faces)).distances
-        vertices = b.closest.find(a.positions).distances
-        rms = max(rms, float(np.sqrt(np.mean(samples**2))))
-        largest = max(largest, float(samples.max()), float(vertices.max()))
-    return SurfaceError(rms / diagonal, largest / diagonal)
+    n = min(max(LEAST_SAMPLES, len(one.faces), len(other.faces)), MOST_SAMPLES)
+    found = measure(one.measured, other.measured, Scale(diagonal, np.zeros(3), diagonal), samples=n, grid=0)
+    return SurfaceError(found.rms / diagonal, found.max / diagonal)

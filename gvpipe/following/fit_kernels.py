@@ -8,8 +8,16 @@ from gvpipe.runtime.compiled import compiled
 
 @compiled
 def add_samples(
-    blocks: Float64, sides: Float64, places: Int64, faces: Int32, triangles: Int64, weights: Float64,
-    normals: Float64, points: Float64, plane: Float64, point: Float64,
+    blocks: Float64,
+    sides: Float64,
+    places: Int64,
+    faces: Int32,
+    triangles: Int64,
+    weights: Float64,
+    normals: Float64,
+    points: Float64,
+    plane: Float64,
+    point: Float64,
 ) -> None:
     """Add ``plane (n . (w x - p))^2 + point |w x - p|^2`` for samples of triangles.
 

@@ -95,7 +95,10 @@ def read_frame(frames: MeshFrames, frame: int) -> tuple[Float64, Int32]:
     if faces.size == 0:
         return points, np.empty((0, 3), np.int32)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.min() < 0 or faces.max() >= len(points):
-        raise InputError(f"frame {frame}: triangles of shape {faces.shape} with vertices {faces.min()} to {faces.max()}; (T, 3), 0 to {len(points) - 1} are needed")
+        raise InputError(
+            f"frame {frame}: triangles of shape {faces.shape}, vertices {faces.min()} to {faces.max()}; "
+            f"shape (T, 3) and vertices 0 to {len(points) - 1} are needed"
+        )
     return points, faces.astype(np.int32)
 
 

@@ -85,9 +85,9 @@ class Growth:
         self._positions = self._mesh.fit(key.positions, key.positions, Goal(surface), SURFACE)
         self._cage = Cage(Moved(self._positions, self.faces), limits.diagonal)
         error = surface_error(Moved(self._positions, self.faces), surface, limits.diagonal)
-        plain = surface_error(key, surface, limits.diagonal)
-        if plain.largest > 0 and not is_within(error, limits.error) or plain.rms < error.rms:
-            self._positions, error = key.positions, plain
+        unfitted = surface_error(key, surface, limits.diagonal)
+        if (not is_within(unfitted, limits.error), unfitted) < (not is_within(error, limits.error), error):
+            self._positions, error = key.positions, unfitted
         rms = limits.error.rms if limits.n_vertices is None else max(limits.error.rms, GIVEN_VERTICES * error.rms)
         self._limit = SurfaceError(rms, limits.error.largest)
         self.is_within = is_within(error, self._limit)

@@ -35,7 +35,7 @@ class StoredFrames:
 
     def append(self, positions: Float64) -> None:
         """Keep ``positions (V, 3)`` as the next frame."""
-        data = memoryview(np.ascontiguousarray(positions, dtype=np.float64)).cast("B")
+        data = memoryview(np.ascontiguousarray(positions, dtype=np.float64).tobytes())
         try:
             with self._lock:
                 self._file.seek(self._n_frames * len(data))

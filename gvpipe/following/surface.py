@@ -6,9 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from gvpipe.following.closest import ClosestPoints, Hits, triangle_normals
-from gvpipe.foundation.arrays import Array, Bool, Float64, Int32, Int64
+from gvpipe.following.closest import ClosestPoints, Hits
+from gvpipe.foundation.arrays import Bool, Float64, Int32, Int64
 from gvpipe.mesh.topology import weld
+from gvpipe.metrics.surface import Surface as MeasuredSurface
 
 SEED = 1  # of the places of samples
 ON_EDGE = 1e-9  # a barycentric coordinate below this lies on an edge
@@ -41,11 +42,11 @@ class Surface:
 
     def __init__(self, points: Float64, faces: Int32) -> None:
         first, point_of = weld(points)
-        faces = point_of[faces].astype(np.int32)
-        distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])
-        used, faces = np.unique(faces[distinct], return_inverse=True)
+        welded = point_of[faces]
+        distinct = (welded[:, 0] != welded[:, 1]) & (welded[:, 1] != welded[:, 2]) & (welded[:, 0] != welded[:, 2])
+        used, numbers = np.unique(welded[distinct], return_inverse=True)
         self.positions: Float64 = points[first][used].astype(np.float64)
-        self.faces: Int32 = faces.reshape(-1, 3).astype(np.int32)
+        self.faces: Int32 = numbers.reshape(-1, 3).astype(np.int32)
 
     @property
     def is_empty(self) -> bool:
@@ -62,6 +63,11 @@ class Surface:
     def closest(self) -> ClosestPoints:
         """Its triangles, for queries."""
         return ClosestPoints(self.positions, self.faces)
+
+    @cached_property
+    def measured(self) -> MeasuredSurface:
+        """The same, for distances to other surfaces."""
+        return MeasuredSurface(self.positions, self.faces, "a surface")
 
     @cached_property
     def border_sides(self) -> Bool:
@@ -96,7 +102,9 @@ class Moved(Surface):
 
 def border_sides(faces: Int32, n_vertices: int) -> Bool:
     """``(T, 3)``: whether the side opposite each corner of ``faces (T, 3)`` belongs to one triangle alone."""
-    sides = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], axis=1).astype(np.int64), axis=2)  # (T, 3, 2)
+    sides = np.sort(
+        np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], axis=1).astype(np.int64), axis=2
+    )  # (T, 3, 2)
     _, which, counts = np.unique(sides[..., 0] * n_vertices + sides[..., 1], return_inverse=True, return_counts=True)
     return np.asarray((counts == 1)[which].reshape(-1, 3))
 
@@ -105,10 +113,9 @@ def vertex_normals(positions: Float64, faces: Int32) -> Float64:
     """``(V, 3)`` of length 1: sums of the triangles' normals by area; 0 where there is none."""
     corners = positions[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = np.stack(
-        [np.bincount(faces.ravel(), np.repeat(across[:, axis], 3), len(positions)) for axis in range(3)], axis=1
-    )
-    return unit(sums)
+    corner = faces.ravel()
+    sums = [np.bincount(corner, np.repeat(across[:, axis], 3), len(positions)) for axis in range(3)]
+    return unit(np.stack(sums, axis=1).astype(np.float64))
 
 
 def unit(vectors: Float64) -> Float64:
@@ -116,11 +123,3 @@ def unit(vectors: Float64) -> Float64:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     result: Float64 = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0)
     return result
-
-
-def as_surface(points: Array, faces: Array) -> Surface:
-    """A `Surface` of arrays of any number type."""
-    return Surface(np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int32).reshape(-1, 3))
-
-
-__all__ = ["Samples", "Surface", "as_surface", "border_sides", "triangle_normals", "unit", "vertex_normals"]
