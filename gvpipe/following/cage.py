@@ -36,7 +36,7 @@ class Cage:
         kept = kept[(kept[:, 0] != kept[:, 1]) & (kept[:, 1] != kept[:, 2]) & (kept[:, 0] != kept[:, 2])]
         self._nodes, faces = np.unique(kept, return_inverse=True)
         self._faces = faces.reshape(-1, 3).astype(np.int32)
-        self._mesh = MovedMesh(self._faces, len(self._nodes), diagonal)
+        self._mesh = MovedMesh(key.positions[self._nodes], self._faces, diagonal)
         search = ClosestPoints(key.positions[self._nodes], self._faces)
         hits = search.find(key.positions, vertex_normals(key.positions, key.faces), AGREEMENT)
         missed = hits.triangles < 0

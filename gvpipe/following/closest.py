@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.metrics.triangle_tree import curve_order
 from gvpipe.runtime.ahead import run_ahead
 
 MANY = 2048  # points that pay for another thread
-CELLS = 1 << 16  # steps of the Morton curve along each axis
 
 
 class Hits(NamedTuple):
@@ -42,7 +42,7 @@ class ClosestPoints:
         from gvpipe.following.closest_kernels import LEAF, Boxes, fill_bounds
 
         corners = positions[faces]  # (T, 3 corners, 3)
-        self._order = _morton_order(corners.mean(axis=1))
+        self._order = curve_order(corners.mean(axis=1))
         corners = corners[self._order]
         n_leaves = 1 << max(0, int(np.ceil(np.log2(max(1, -(-len(faces) // LEAF))))))
         bounds = np.empty((2 * n_leaves - 1, 6))
@@ -96,15 +96,3 @@ def triangle_normals(corners: Float64) -> Float64:
 
 def _parts(n: int) -> list[slice]:
     return [slice(0, n)] if n < MANY else [slice(0, n // 2), slice(n // 2, n)]
-
-
-def _morton_order(points: Float64) -> Int64:
-    """The order ``(T,)`` of points along a Morton curve."""
-    low = points.min(axis=0)
-    extent = float(np.ptp(points, axis=0).max())
-    cells = ((points - low) * ((CELLS - 1) / extent if extent > 0 else 0.0)).astype(np.uint64)
-    for shift, mask in ((16, 0x0000FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249)):
-        cells = (cells | (cells << np.uint64(shift))) & np.uint64(mask)
-    code = cells[:, 0] | (cells[:, 1] << np.uint64(1)) | (cells[:, 2] << np.uint64(2))
-    order: Int64 = np.argsort(code, kind="stable").astype(np.int64)
-    return order

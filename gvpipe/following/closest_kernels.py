@@ -99,11 +99,20 @@ def closest_on_triangle(c: Float64, x: float, y: float, z: float, weights: Float
     return squared
 
 
+@inlined
+def _agree(tree_normals: Float64, t: int, normals: Float64, p: int) -> float:
+    """The cosine between two normals."""
+    cosine: float = tree_normals[t, 0] * normals[p, 0] + tree_normals[t, 1] * normals[p, 1] + tree_normals[t, 2] * normals[p, 2]
+    return cosine
+
+
 @compiled
 def find_closest(
     tree: Boxes, points: Float64, normals: Float64, agreement: float, reach: Float64, triangles: Int64, weights: Float64
 ) -> None:
     """Closest points on the triangles whose normals agree.
+
+    The triangle found for a point bounds the search of the next, so points that follow each other should be near each other.
 
     Args:
         tree: of the triangles.
@@ -116,10 +125,15 @@ def find_closest(
     """
     waiting, far = np.empty(STACK, np.int64), np.empty(STACK, np.float64)
     trial = np.empty(3)
-    checks = agreement > -1.0
+    checks, last = agreement > -1.0, -1
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         best, found = reach[p], -1
+        if last >= 0 and (not checks or _agree(tree.normals, last, normals, p) >= agreement):
+            distance = closest_on_triangle(tree.corners[last], x, y, z, trial)
+            if distance <= best:
+                best, found = distance, last
+                weights[p, 0], weights[p, 1], weights[p, 2] = trial[0], trial[1], trial[2]
         waiting[0], far[0], height = 0, _box_distance(tree.bounds, 0, x, y, z), 1
         while height > 0:
             height -= 1
@@ -129,10 +143,8 @@ def find_closest(
             if node >= tree.first_leaf:
                 first = (node - tree.first_leaf) * LEAF
                 for t in range(first, min(first + LEAF, len(tree.corners))):
-                    if checks:
-                        n = tree.normals[t]
-                        if n[0] * normals[p, 0] + n[1] * normals[p, 1] + n[2] * normals[p, 2] < agreement:
-                            continue
+                    if checks and _agree(tree.normals, t, normals, p) < agreement:
+                        continue
                     distance = closest_on_triangle(tree.corners[t], x, y, z, trial)
                     if distance < best or (distance == best and found < 0):
                         best, found = distance, t
@@ -149,3 +161,5 @@ def find_closest(
                 waiting[height], far[height] = left, near
                 height += 1
         reach[p], triangles[p] = best, found
+        if found >= 0:
+            last = found

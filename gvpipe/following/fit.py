@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from gvpipe.foundation.arrays import Bool, Float64, Int32
 
 N_SAMPLES = 24_000  # of the frame's surface
 STILL = 1e-5  # part of the diagonal: a round that moves vertices less, root mean square, is the last one of its stage
-INNER = np.array([[1, 1, 1], [3, 1, 1], [1, 3, 1], [1, 1, 3]]) / np.array([[3], [5], [5], [5]])
 
 
 class Goal:
@@ -37,14 +35,16 @@ class MovedMesh:
     """The mesh that is fitted to one frame after the other.
 
     Args:
+        positions: ``(V, 3)``, model units, at some frame; each vertex is used.
         faces: ``(T, 3)``, T > 0.
-        n_vertices: V, each of them used.
         diagonal: model units; what parts in a `Stage` refer to.
     """
 
-    def __init__(self, faces: Int32, n_vertices: int, diagonal: float) -> None:
+    def __init__(self, positions: Float64, faces: Int32, diagonal: float) -> None:
+        n_vertices = len(positions)
         self.faces, self._diagonal, self._n = faces, diagonal, n_vertices
         self._deformation = Deformation(faces, n_vertices)
+        self._samples = _samples(positions, faces)
         sides = border_sides(faces, n_vertices)
         self._border: Bool = np.zeros(n_vertices, bool)
         self._border[np.roll(faces, -1, axis=1)[sides]] = self._border[np.roll(faces, -2, axis=1)[sides]] = True
@@ -75,7 +75,7 @@ class MovedMesh:
         from gvpipe.following.fit_kernels import add_samples
 
         blocks, sides = self._deformation.no_equations()
-        samples = self._samples[stage.per_triangle]
+        samples = self._samples
         points = samples.of(positions, self.faces)
         normals = unit(samples.of(vertex_normals(positions, self.faces), self.faces))
         reach = stage.reach * self._diagonal
@@ -106,16 +106,10 @@ class MovedMesh:
         result: Float64 = counts / (1 + ratio**2) ** 2 * (self._n / len(counts))
         return result
 
-    @cached_property
-    def _samples(self) -> dict[int, Samples]:
-        """Samples by how many lie inside of each triangle."""
-        n_triangles = len(self.faces)
-        _, corner = np.unique(self.faces, return_index=True)  # one of each vertex' corners
-        at_vertices = np.eye(3)[corner % 3]
-        return {
-            n: Samples(
-                np.concatenate([corner // 3, np.repeat(np.arange(n_triangles), n)]),
-                np.concatenate([at_vertices, np.tile(INNER[:n], (n_triangles, 1))]),
-            )
-            for n in (1, len(INNER))
-        }
+
+def _samples(positions: Float64, faces: Int32) -> Samples:
+    """All vertices, and the middle of each triangle."""
+    _, corner = np.unique(faces, return_index=True)  # one of each vertex' corners
+    triangles = np.concatenate([corner // 3, np.arange(len(faces))])
+    weights = np.concatenate([np.eye(3)[corner % 3], np.full((len(faces), 3), 1 / 3)])
+    return Samples(triangles, weights).sorted_for(positions, faces)

@@ -81,7 +81,7 @@ class Growth:
         self.frame, self._diagonal = frame, limits.diagonal
         key = key_mesh(surface, limits.diagonal, KEY_SHARE * limits.error.rms, limits.n_vertices)
         self.faces = key.faces
-        self._mesh = MovedMesh(key.faces, len(key.positions), limits.diagonal)
+        self._mesh = MovedMesh(key.positions, key.faces, limits.diagonal)
         self._positions = self._mesh.fit(key.positions, key.positions, Goal(surface), SURFACE)
         self._cage = Cage(Moved(self._positions, self.faces), limits.diagonal)
         error = surface_error(Moved(self._positions, self.faces), surface, limits.diagonal)

@@ -19,7 +19,6 @@ class Stage:
         follows_borders: whether pairs may end at a border. If not, a hole of one surface does not pull the other's.
         flows: whether each round starts from the shape of the one before, as a viscous sheet does. If not, edges go back to
             their lengths at rest.
-        per_triangle: samples inside of each triangle that is moved; its vertices are samples, too.
     """
 
     rounds: int
@@ -30,7 +29,6 @@ class Stage:
     hold: float = 0.1
     follows_borders: bool = False
     flows: bool = False
-    per_triangle: int = 1
 
 
 MOTION = (
@@ -39,12 +37,12 @@ MOTION = (
     Stage(5, 3.0, 0.015, 0.3, 0.05),
     Stage(5, 1.0, 0.006, 0.4, 0.03),
 )
-"""Of a coarse mesh, from where a frame is expected to the surface."""
+"""The coarse mesh, from where a frame is expected to the surface."""
 
 SURFACE = (
     Stage(3, 1.0, 0.01, 0.3, 0.04),
-    Stage(3, 0.3, 0.02, 0.0, 0.04, hold=0.5, follows_borders=True, flows=True, per_triangle=4),
-    Stage(3, 0.05, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True, per_triangle=4),
-    Stage(3, 0.01, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True, per_triangle=4),
+    Stage(3, 0.3, 0.02, 0.0, 0.04, hold=0.5, follows_borders=True, flows=True),
+    Stage(3, 0.05, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
+    Stage(3, 0.01, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
 )
-"""Of the whole mesh, onto the surface: in the end all that is left of the distance counts, whatever the normals."""
+"""The whole mesh, onto the surface: in the end all that is left of the distance counts, whatever the normals."""

@@ -10,6 +10,7 @@ from gvpipe.following.closest import ClosestPoints, Hits
 from gvpipe.foundation.arrays import Bool, Float64, Int32, Int64
 from gvpipe.mesh.topology import weld
 from gvpipe.metrics.surface import Surface as MeasuredSurface
+from gvpipe.metrics.triangle_tree import curve_order
 
 SEED = 1  # of the places of samples
 ON_EDGE = 1e-9  # a barycentric coordinate below this lies on an edge
@@ -30,6 +31,11 @@ class Samples:
         """Values ``(P, C)`` at the samples, of values at vertices ``(V, C)``."""
         result: Float64 = np.einsum("pk,pkd->pd", self.weights, values[faces[self.triangles]])
         return result
+
+    def sorted_for(self, positions: Float64, faces: Int32) -> Samples:
+        """The same in the order along a curve through ``positions (V, 3)``, which makes searches quick."""
+        order = curve_order(self.of(positions, faces))
+        return Samples(self.triangles[order], self.weights[order])
 
 
 class Surface:
@@ -81,7 +87,8 @@ class Surface:
         at = (np.arange(n) + random.random(n)) * (ends[-1] / n)
         triangles = np.minimum(np.searchsorted(ends, at, side="right"), len(ends) - 1)
         root, along = np.sqrt(random.random(n)), random.random(n)
-        return Samples(triangles, np.stack([1 - root, root * (1 - along), root * along], axis=1))
+        samples = Samples(triangles, np.stack([1 - root, root * (1 - along), root * along], axis=1))
+        return samples.sorted_for(self.positions, self.faces)
 
     def on_border(self, hits: Hits) -> Bool:
         """Whether each closest point ``(P,)`` lies on a side without a triangle beyond."""

@@ -48,7 +48,7 @@ def bent(t: float, seed: int) -> Mesh:
 def two_balls(seed: int) -> Mesh:
     """Two spheres apart."""
     points, faces = ball(500, seed)
-    return np.concatenate([points, points + [0, 3.0, 0]]), np.concatenate([faces, faces + len(points)])
+    return np.concatenate([points, points + np.array([0, 3.0, 0])]), np.concatenate([faces, faces + len(points)])
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +152,7 @@ def test_colours_come_from_the_frame(moving: list[Mesh], followed: list[Run]) ->
     """Any linear function of position, given at a frame's vertices, comes back at the places."""
     (run,) = followed
     points, faces = moving[3]
-    positions = run.positions[3]
+    positions = run.positions[3:4][0]
     places = places_on(positions, run.faces, points, faces)
     at = places.of_vertices(points, faces)
     np.testing.assert_allclose(np.linalg.norm(at - positions, axis=1), places.distances, atol=1e-12)
@@ -180,11 +180,10 @@ def test_a_mesh_without_samples_turns_as_a_whole() -> None:
     """Edges alone: from a turned shape, the solution is that shape again."""
     points, faces = ball(60)
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
-    turned: Float64 = points @ (turn * np.linalg.det(turn)).T
+    turn *= np.linalg.det(turn)
+    turned: Float64 = points @ turn.T
     deformation = Deformation(faces, len(points))
-    np.testing.assert_allclose(
-        deformation.rotations(points, turned), np.broadcast_to(turn * np.linalg.det(turn), (60, 3, 3)), atol=1e-8
-    )
+    np.testing.assert_allclose(deformation.rotations(points, turned), np.broadcast_to(turn, (60, 3, 3)), atol=1e-8)
     found = deformation.solve(*deformation.no_equations(), turned, points, 1.0)
     np.testing.assert_allclose(found, turned, atol=1e-6)
 
