@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gvpipe.metrics.comparison import Comparison
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
+    from gvpipe.notebook import show
     from gvpipe.playback.files import read, write
     from gvpipe.playback.live import LiveEncoder, open_live
     from gvpipe.playback.player import Player
@@ -75,6 +76,7 @@ __all__ = [
     "read",
     "render",
     "restream",
+    "show",
     "skin",
     "write",
 ]
@@ -91,6 +93,7 @@ _HOMES = {
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
+    "gvpipe.notebook": ("show",),
     "gvpipe.playback.files": ("read", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
     "gvpipe.metrics.comparison": ("Comparison",),

@@ -8,7 +8,7 @@
  * ("azimuth,elevation" of the first view, degrees), `shading` ("flat": each triangle has one normal),
  * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up).
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
+ * the frame's number), `viewchange` (detail: azimuth and elevation that a user turned to), `partschange` (detail: names of hidden parts), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
@@ -65,6 +65,7 @@ export class GeometryVideoElement extends Base {
   #probe;
   #loading = null; // Load
   #loaded = null; // promise, while a file is loaded
+  #given = null; // what was loaded last, as it was given
   #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
   #isReady = false; // whether a file is loaded, and said to be
   #giveUps = new Set(); // reject what waits for that to play
@@ -98,7 +99,10 @@ export class GeometryVideoElement extends Base {
       field: (name) => (name ? this.setAttribute("field", name) : this.removeAttribute("field")),
       colormap: (name) => this.setAttribute("colormap", name),
       warp: (name, scale) => this.setAttribute("warp", `${name}:${scale}`),
-      hide: (names) => this.hide(names),
+      hide: (names) => {
+        this.hide(names);
+        this.#tell("partschange", [...names]);
+      },
     });
     this.#legend = new Legend(root.querySelector(".legend"));
     this.#probe = new Probe(root.querySelector(".probe"), (vertex) => this.#stage?.setMark(vertex));
@@ -110,7 +114,8 @@ export class GeometryVideoElement extends Base {
   }
 
   connectedCallback() {
-    if (this.hasAttribute("src") && !this.#loaded) this.load(this.getAttribute("src"));
+    const source = this.#given ?? this.getAttribute("src");
+    if (source !== null && !this.#loaded) this.load(source); // anew, where it was taken out of the page
   }
 
   disconnectedCallback() {
@@ -133,7 +138,8 @@ export class GeometryVideoElement extends Base {
   }
 
   attributeChangedCallback(name, before, value) {
-    if (name === "src" && this.isConnected && value !== null && (before !== value || this.error)) this.load(value);
+    if (name === "src" && !this.isConnected) this.#given = null;
+    else if (name === "src" && value !== null && (before !== value || this.error)) this.load(value);
     if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
@@ -281,6 +287,16 @@ export class GeometryVideoElement extends Base {
     return numbers.length === 2 && numbers.every(Number.isFinite) && Math.abs(numbers[1]) <= 90 ? numbers : null;
   }
 
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  get view() {
+    return this.#mesh ? this.#stage.angles : null;
+  }
+
+  /** Turn the camera about the middle of the picture. @param {number} azimuth @param {number} elevation degrees */
+  turnTo(azimuth, elevation) {
+    if (this.#mesh) this.#stage.turnTo([azimuth, elevation]);
+  }
+
   /** Names of the parts that are hidden. */
   get hiddenParts() {
     return new Set(this.#hidden);
@@ -302,6 +318,7 @@ export class GeometryVideoElement extends Base {
   /** Load and show a file: an address, `#id`, or the file itself; without one, `src` anew. Errors are shown in the element. */
   load(source = this.src) {
     this.#unload();
+    this.#given = source;
     this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
     let end;
     this.#loaded = new Promise((resolve) => (end = resolve)); // there before any listener is told
@@ -372,7 +389,9 @@ export class GeometryVideoElement extends Base {
     const canvas = this.shadowRoot.querySelector("canvas");
     canvas.addEventListener("webglcontextlost", () => this.#stage?.hasMesh && this.#say(LOST, "alert"));
     canvas.addEventListener("webglcontextrestored", () => this.#say(""));
-    return openStage(canvas);
+    const stage = openStage(canvas);
+    stage.turned = () => this.#tell("viewchange", stage.angles);
+    return stage;
   }
 
   #openMesh() {
