@@ -13,7 +13,7 @@ AFTER = 0.5  # s until it appears: short work needs none
 
 
 class ProgressBar:
-    """Called with a stage and the part of it that is done, as `gvpipe.foundation.progress.Progress`; outside of notebooks nothing shows.
+    """A `gvpipe.foundation.progress.Progress` that shows in notebooks, and nowhere else.
 
     Args:
         name: of what is encoded.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import html
+
 from gvpipe.foundation.errors import GvpipeError
 from gvpipe.foundation.text import escaped
 from gvpipe.model.notebook import png

@@ -15,15 +15,17 @@ from gvpipe.web.export import AXES
 from gvpipe.web.page_view import page_view
 
 if TYPE_CHECKING:
+    from gvpipe.notebook.side_by_side import SideBySide
     from gvpipe.notebook.widget import PlayerWidget
 
 ERROR = "0.1%"  # of the diagonal: less than a pixel of a player
 HEIGHT = 420  # pixels
+LONGEST_NAME = 80  # characters, beside the progress bar
 
 
 def show(
     source: Any,
-    *,
+    *others: Any,
     field: str | None = None,
     colormap: str | None = None,
     field_range: Range = None,
@@ -40,7 +42,7 @@ def show(
     error: float | str = ERROR,
     embed: bool | None = None,
     unlimited: bool = False,
-) -> PlayerWidget:
+) -> PlayerWidget | SideBySide:
     """Show a geometry video or a sequence in a notebook: an interactive player, whose traits Python reads and sets.
 
     A geometry video is shown as it is. A sequence is encoded by codec ``pca`` first, once; ``widget.note`` says its error.
@@ -48,6 +50,7 @@ def show(
 
     Args:
         source: `Player`, `MeshSequence` or what `read` takes, such as a path.
+        others: to show beside it, with as many frames: they play and turn in step, as source and decoded.
         field, colormap, field_range, log, speed, warp, camera, shading: how it opens, as for `export_html`.
         parts: names of the parts to show; None: all.
         up: the axis that stands upright in the first view, ``"y"`` or ``"z"``; None: the file's own, else ``"y"``.
@@ -59,10 +62,12 @@ def show(
         unlimited: as for `open`.
 
     Returns:
-        An ipywidgets widget with traits ``frame``, ``playing``, ``speed``, ``field``, ``range``, ``camera`` and ``parts``.
+        An ipywidgets widget with traits ``frame``, ``playing``, ``speed``, ``field``, ``range``, ``camera`` and ``parts``. Of
+        several sources: a box of such widgets, ``players``.
 
     Raises:
-        InputError: anywidget is not installed, the source cannot be read, or it has no such field or part.
+        InputError: anywidget is not installed, a source cannot be read, or it has no such field or part; sources differ in
+            their number of frames.
         FormatError: it is no geometry video, or a damaged one.
         TypeError: the source is none of these.
 
@@ -73,25 +78,28 @@ def show(
     check_widgets()
     if up is not None and up not in AXES:
         raise InputError(f"up is {up!r}; one of {', '.join(AXES)} is needed")
-    bar = ProgressBar(getattr(source, "name", None) or str(source)[:80])
-    prepared = prepare(source, error, bar, unlimited=unlimited)
-    bar.finish(prepared.note)
-    sequence = prepared.player.sequence()
-    names = None if parts is None else [parts] if isinstance(parts, str) else list(parts)
-    if names is not None:
-        only_parts(sequence, names)
-    view = page_view(
-        sequence,
-        field=field,
-        colormap=colormap,
-        field_range=field_range,
-        log=log,
-        speed=speed,
-        warp=warp,
-        camera=camera,
-        shading=shading,
-    )
-    own = prepared.player.metadata.up_axis
+    from gvpipe.notebook.side_by_side import SideBySide
     from gvpipe.notebook.widget import PlayerWidget
 
-    return PlayerWidget(prepared, view, names, up or (own if own in AXES else "y"), autoplay, loop, height, embed)
+    names = None if parts is None else [parts] if isinstance(parts, str) else list(parts)
+    players = []
+    for given in (source, *others):
+        bar = ProgressBar(str(getattr(given, "name", given))[:LONGEST_NAME])
+        prepared = prepare(given, error, bar, unlimited=unlimited)
+        bar.finish(prepared.note)
+        sequence = prepared.player.sequence()
+        if names is not None:
+            only_parts(sequence, names)
+        view = page_view(
+            sequence,
+            field=field,
+            colormap=colormap,
+            field_range=field_range,
+            log=log,
+            speed=speed,
+            warp=warp,
+            camera=camera,
+            shading=shading,
+        )
+        players.append(PlayerWidget(prepared, view, names, up, autoplay, loop, height, embed))
+    return SideBySide(players) if others else players[0]

@@ -16,10 +16,10 @@ from gvpipe.notebook.module import module_text
 from gvpipe.notebook.pick import Pick, read_pick
 from gvpipe.notebook.prepared import Prepared
 from gvpipe.notebook.saved import picture, saved_html
+from gvpipe.web.export import AXES
 from gvpipe.web.page_view import FASTEST, SLOWEST, PageView
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
-HEIGHT = 420  # pixels, by default
 
 
 class PlayerWidget(anywidget.AnyWidget):
@@ -41,7 +41,7 @@ class PlayerWidget(anywidget.AnyWidget):
         prepared: what to show.
         view: how it opens.
         parts: names of the parts to show; None: all.
-        up: the axis that stands upright, ``"y"`` or ``"z"``.
+        up: the axis that stands upright, ``"y"`` or ``"z"``; None: the video's own, else ``"y"``.
         playing: whether it plays at once.
         loop: whether it starts again at its end.
         height: pixels.
@@ -69,13 +69,15 @@ class PlayerWidget(anywidget.AnyWidget):
         prepared: Prepared,
         view: PageView,
         parts: Sequence[str] | None = None,
-        up: str = "y",
+        up: str | None = None,
         playing: bool = True,
         loop: bool = True,
-        height: int = HEIGHT,
+        height: int = 420,
         embed: bool | None = None,
     ) -> None:
         self._esm = module_text()
+        own = prepared.player.metadata.up_axis
+        up = up or (own if own in AXES else AXES[0])
         self._prepared, self._view, self._up, self._height, self._embed = prepared, view, up, height, embed
         self._picked = CallbackDispatcher()
         kept = {"colormap": view.colormap, "scale": "log" if view.log else None, "warp": view.warp, "shading": view.shading}
@@ -98,6 +100,11 @@ class PlayerWidget(anywidget.AnyWidget):
     def note(self) -> str:
         """What was done to what was given to show it, such as an encoding and its error; "" for nothing."""
         return self._prepared.note
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return len(self._prepared.player)
 
     def on_pick(self, callback: Callable[[Pick], None], remove: bool = False) -> None:
         """Call a function with a `Pick` when a user clicks on the mesh, or no longer."""
@@ -160,25 +167,30 @@ class PlayerWidget(anywidget.AnyWidget):
         else:
             self.send(answer, buffers=[data])
 
-    def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
-        """What a notebook keeps: a still and the player as HTML. The widget is an output of its own, above it.
-
-        Viewers show of one output what they like best, which is the widget, even where there is no kernel to draw it.
-        """
-        from IPython.display import display
-
+    def saved(self) -> dict[str, Any]:
+        """What a notebook keeps of it, by media type: HTML with a still and the player, and the still as PNG."""
         still = picture(self._prepared)
-        text = f"{self.name}: {self._prepared.player!r}"
-        display(
-            {WIDGET: {"version_major": 2, "version_minor": 0, "model_id": self.model_id}, "text/plain": text},
-            raw=True,
-        )
         kept = saved_html(self._prepared, self._view, self._up, self._saved_id, still, self._height, self._embed)
-        bundle: dict[str, Any] = {"text/html": kept, "text/plain": text}
+        bundle: dict[str, Any] = {"text/html": kept, "text/plain": repr(self)}
         return bundle if still is None else {**bundle, "image/png": still}
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
+        return shown_above(self, self.saved())
 
     def __repr__(self) -> str:
         return f"<PlayerWidget {self.name}: frame {self.frame} of {len(self._prepared.player)}>"
+
+
+def shown_above(widget: Any, kept: dict[str, Any]) -> dict[str, Any]:
+    """Show a widget in an output of its own; return what is kept of it, which is the output below.
+
+    Viewers show of one output what they like best: the widget, even where there is no kernel to draw it.
+    """
+    from IPython.display import display
+
+    view = {"version_major": 2, "version_minor": 0, "model_id": widget.model_id}
+    display({WIDGET: view, "text/plain": repr(widget)}, raw=True)
+    return kept
 
 
 def read_range(prepared: Prepared, start: Any, stop: Any) -> bytes:
