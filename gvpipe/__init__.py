@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from gvpipe.playback.video_info import Info, info
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
+    from gvpipe.recording import Recorder, RigidParts, record
     from gvpipe.web import ExportReport, export_html
 
 __all__ = [
@@ -57,9 +58,11 @@ __all__ = [
     "Metadata",
     "Part",
     "Player",
+    "Recorder",
     "Renderer",
     "Report",
     "Restreamed",
+    "RigidParts",
     "Skin",
     "Texture",
     "Volume",
@@ -74,6 +77,7 @@ __all__ = [
     "open",
     "open_live",
     "read",
+    "record",
     "render",
     "restream",
     "show",
@@ -102,6 +106,7 @@ _HOMES = {
     "gvpipe.rasterizer.renderer": ("Renderer",),
     "gvpipe.model.sequence": ("MeshSequence",),
     "gvpipe.model.skin": ("Skin",),
+    "gvpipe.recording": ("Recorder", "RigidParts", "record"),
     "gvpipe.playback.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }

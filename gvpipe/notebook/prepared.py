@@ -7,10 +7,9 @@ stream layout, of which players fetch no more than they need.
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 import weakref
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gvpipe.api import encode, restream
@@ -19,6 +18,7 @@ from gvpipe.container.bitstream import PLAIN, STREAM
 from gvpipe.container.mp4 import file_bytes
 from gvpipe.container.sources import VIDEO_SUFFIXES, BytesSource, FileSource, Source, is_remote
 from gvpipe.foundation.arguments import show
+from gvpipe.foundation.atomic import PREFIX, new_folder, remove_abandoned_folders, remove_folder
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
@@ -41,14 +41,12 @@ class Prepared:
         player: of the file that is shown.
         source: the file's bytes.
         note: what was done to what was given, one line; "" if it is shown as it is.
-        folder: what holds the file, if it is a temporary one.
     """
 
     name: str
     player: Player
     source: Source
     note: str = ""
-    folder: tempfile.TemporaryDirectory[str] | None = field(default=None, repr=False)
 
     @property
     def is_large(self) -> bool:
@@ -118,17 +116,15 @@ def _of_player(player: Player) -> Prepared:
     source = FileSource(player.on_disk)
     if source.size <= MOST_AT_ONCE or bitstream.layout == STREAM:
         return Prepared(player.path, player, source)
-    folder = tempfile.TemporaryDirectory(prefix="gvpipe-")
-    path = os.path.join(folder.name, "shown.mp4")
+    path = _temporary_file()
     restream(player.on_disk, path, STREAM, unlimited=True)
-    return Prepared(player.path, player, FileSource(path), folder=folder)
+    return _holding(path, Prepared(player.path, player, FileSource(path)))
 
 
 def _encoded(sequence: MeshSequence, error: float | str, progress: Progress | None) -> Prepared:
     """Encode a sequence within an error: at `QUALITY` if that is fine enough, else as a search for the bound finds."""
     bound, begun = parse_bound(error, sequence), time.perf_counter()
-    folder = tempfile.TemporaryDirectory(prefix="gvpipe-")
-    path = os.path.join(folder.name, "shown.mp4")
+    path = _temporary_file()
     encode(sequence, path, CODEC, progress, quality=QUALITY, stream=True)
     player = Player(path, unlimited=True)
     errors = measure_errors(sequence, lambda start, stop: player[start:stop])
@@ -141,7 +137,19 @@ def _encoded(sequence: MeshSequence, error: float | str, progress: Progress | No
     most = f"{100 * errors.max_diag:.2g} % of the diagonal" if errors.max_diag is not None else f"{errors.max:.2g}"
     seconds = time.perf_counter() - begun
     note = f"encoded by {CODEC} in {seconds:.1f} s: {show_bytes(source.size)}; vertices move by at most {most}"
-    return Prepared(sequence.name, player, source, note, folder)
+    return _holding(path, Prepared(sequence.name, player, source, note))
+
+
+def _temporary_file() -> str:
+    """The path of a file that is to be made, in a folder of its own."""
+    remove_abandoned_folders()
+    return os.path.join(new_folder(PREFIX), "shown.mp4")
+
+
+def _holding(path: str, prepared: Prepared) -> Prepared:
+    """What is prepared, with which a temporary file's folder goes."""
+    weakref.finalize(prepared, remove_folder, os.path.dirname(path))
+    return prepared
 
 
 def show_bytes(count: int) -> str:

@@ -86,7 +86,6 @@ class View {
     for (const name of ["frame", "playing", "speed", "field", "range", "camera", "parts"]) {
       this.#listen(model, `change:${name}`, () => this.#apply(name));
     }
-    this.#listen(model, "change:_data", () => this.#load());
     this.#listen(model, "change:_version", () => this.#load());
     this.#load();
   }

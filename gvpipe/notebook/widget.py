@@ -46,6 +46,7 @@ class PlayerWidget(anywidget.AnyWidget):
         loop: whether it starts again at its end.
         height: pixels.
         embed: whether a saved notebook holds the player and the file; None: if the file has at most 4 MB.
+        is_growing: whether the file is still written, so that frames come.
 
     Raises:
         InputError: a trait is set to what the video has not.
@@ -74,8 +75,10 @@ class PlayerWidget(anywidget.AnyWidget):
         loop: bool = True,
         height: int = 420,
         embed: bool | None = None,
+        is_growing: bool = False,
     ) -> None:
         self._esm = module_text()
+        self._is_growing = is_growing
         own = prepared.player.metadata.up_axis
         up = up or (own if own in AXES else AXES[0])
         self._prepared, self._view, self._up, self._height, self._embed = prepared, view, up, height, embed
@@ -91,7 +94,7 @@ class PlayerWidget(anywidget.AnyWidget):
             parts=None if parts is None else list(parts),
             layout=Layout(width="100%", height=f"{height}px"),
             _attributes={"up": up, **{name: value for name, value in kept.items() if value}, **({"loop": ""} if loop else {})},
-            _data=None if prepared.is_large else prepared.data(),
+            _data=None if is_growing or prepared.is_large else prepared.data(),
             _saved_id=uuid.uuid4().hex,
         )
         self.on_msg(self._take)
@@ -106,6 +109,14 @@ class PlayerWidget(anywidget.AnyWidget):
         """F, the number of frames."""
         return len(self._prepared.player)
 
+    def show_instead(self, prepared: Prepared) -> None:
+        """Show another file in place of this one, such as one that is finished, from its first frame on."""
+        self._prepared, self._is_growing = prepared, False
+        with self.hold_sync():
+            self.frame = 0
+            self._data = None if prepared.is_large else prepared.data()
+            self._version += 1
+
     def on_pick(self, callback: Callable[[Pick], None], remove: bool = False) -> None:
         """Call a function with a `Pick` when a user clicks on the mesh, or no longer."""
         self._picked.register_callback(callback, remove=remove)
@@ -114,6 +125,8 @@ class PlayerWidget(anywidget.AnyWidget):
     def _check_frame(self, proposal: Any) -> int:
         frame: int = proposal["value"]
         n_frames = len(self._prepared.player)
+        if self._is_growing and frame >= 0:
+            return frame
         if not -n_frames <= frame < n_frames:
             raise InputError(f"frame {frame} of {self.name}: there are {n_frames}")
         return frame % n_frames
