@@ -60,6 +60,40 @@ class KernelSource {
   };
 }
 
+/** A file that grows, of which the kernel sends parts as they are written. */
+class GrowingSource {
+  #model;
+  #data;
+  #size;
+
+  constructor(model, name, data) {
+    this.#model = model;
+    this.name = name;
+    [this.#data, this.#size] = [data.slice(), data.length];
+    model.on("msg:custom", this.#take);
+  }
+
+  async fetchRange(start, stop) {
+    return { data: this.#data.slice(start, Math.min(stop, this.#size)), size: this.#size };
+  }
+
+  close() {
+    this.#model.off("msg:custom", this.#take);
+  }
+
+  #take = ({ kind, start }, buffers) => {
+    if (kind !== "part") return;
+    const part = bytesOf(buffers[0]);
+    this.#size = Math.max(this.#size, start + part.length);
+    if (this.#size > this.#data.length) {
+      const larger = new Uint8Array(2 * this.#size);
+      larger.set(this.#data);
+      this.#data = larger;
+    }
+    this.#data.set(part, start);
+  };
+}
+
 function bytesOf(buffer) {
   return ArrayBuffer.isView(buffer) ? new Uint8Array(buffer.buffer, buffer.byteOffset, buffer.byteLength) : new Uint8Array(buffer);
 }
@@ -99,9 +133,11 @@ class View {
   #load() {
     this.#source?.close();
     this.#isReady = false;
-    const data = this.#model.get("_data");
-    this.#source = data ? null : new KernelSource(this.#model, this.#model.get("name"));
-    this.#element.load(data ? bytesOf(data) : this.#source);
+    const model = this.#model;
+    const data = model.get("_data") && bytesOf(model.get("_data"));
+    const source = () => (data ? new GrowingSource(model, model.get("name"), data) : new KernelSource(model, model.get("name")));
+    this.#source = data && !model.get("_is_growing") ? null : source();
+    this.#element.load(this.#source ?? data);
   }
 
   #listen(model, event, call) {

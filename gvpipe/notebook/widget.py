@@ -62,6 +62,7 @@ class PlayerWidget(anywidget.AnyWidget):
     name = traitlets.Unicode("").tag(sync=True)
     _attributes = traitlets.Dict().tag(sync=True)  # of the element, which stay
     _data = traitlets.Bytes(None, allow_none=True).tag(sync=True)  # the file; None: the page asks for parts of it
+    _is_growing = traitlets.Bool(False).tag(sync=True)  # parts of the file come by `send_part`
     _version = traitlets.Int(0).tag(sync=True)  # counts files
     _saved_id = traitlets.Unicode("").tag(sync=True)
 
@@ -78,7 +79,6 @@ class PlayerWidget(anywidget.AnyWidget):
         is_growing: bool = False,
     ) -> None:
         self._esm = module_text()
-        self._is_growing = is_growing
         own = prepared.player.metadata.up_axis
         up = up or (own if own in AXES else AXES[0])
         self._prepared, self._view, self._up, self._height, self._embed = prepared, view, up, height, embed
@@ -94,7 +94,8 @@ class PlayerWidget(anywidget.AnyWidget):
             parts=None if parts is None else list(parts),
             layout=Layout(width="100%", height=f"{height}px"),
             _attributes={"up": up, **{name: value for name, value in kept.items() if value}, **({"loop": ""} if loop else {})},
-            _data=None if is_growing or prepared.is_large else prepared.data(),
+            _data=None if prepared.is_large and not is_growing else prepared.data(),
+            _is_growing=is_growing,
             _saved_id=uuid.uuid4().hex,
         )
         self.on_msg(self._take)
@@ -111,11 +112,16 @@ class PlayerWidget(anywidget.AnyWidget):
 
     def show_instead(self, prepared: Prepared) -> None:
         """Show another file in place of this one, such as one that is finished, from its first frame on."""
-        self._prepared, self._is_growing = prepared, False
+        self._prepared = prepared
         with self.hold_sync():
+            self._is_growing = False
             self.frame = 0
             self._data = None if prepared.is_large else prepared.data()
             self._version += 1
+
+    def send_part(self, start: int, data: bytes) -> None:
+        """Send a part of a file that grows, from byte ``start`` on, to pages that show it."""
+        self.send({"kind": "part", "start": start}, buffers=[data])
 
     def on_pick(self, callback: Callable[[Pick], None], remove: bool = False) -> None:
         """Call a function with a `Pick` when a user clicks on the mesh, or no longer."""

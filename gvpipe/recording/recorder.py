@@ -111,11 +111,12 @@ class Recorder:
             names = [", ".join(sorted(each)) or "no fields" for each in (given, spools)]
             raise InputError(f"frame {self.n_frames} has {names[0]}; frame 0 has {names[1]}, and all must have the same")
         kept = {name: spool.checked(given[name], self.n_frames) for name, spool in spools.items()}
+        n_before = self._live.n_written
         self._live.append(points)
         self._spools = spools
         for name, spool in spools.items():
             spool.append(kept[name])
-        if self._live.n_written:
+        if self._live.n_written > n_before:
             self._show()
 
     def close(self) -> None:
@@ -131,7 +132,7 @@ class Recorder:
         self._live.close()
         if not self._live.n_written:
             return
-        self._add_asset()
+        self._make_whole()
         if self._view is not None:
             self._view.finish(self.growing)
         if self.path.suffix.lower() in SUFFIXES:
@@ -156,13 +157,11 @@ class Recorder:
                 raise InputError(f"fields has a bound of {name!r}, which frame 0 has not; it has {', '.join(given) or 'none'}")
         return {name: FieldSpool(name, values, first.rows) for name, values in given.items()}
 
-    def _add_asset(self) -> None:
-        """Code what lies beside positions into the file."""
-        spools = self._spools or {}
-        if spools or any(self._beside[name] for name in ("attributes", "parts", "materials", "images")):
-            with Player(self.growing, unlimited=True) as player:
-                whole = self._with_asset(player, spools)
-            write_file(whole, self.growing, parts=segment_parts(whole))
+    def _make_whole(self) -> None:
+        """Code what lies beside positions into the file, and give back the room that it had to grow."""
+        with Player(self.growing, unlimited=True) as player:
+            whole = self._with_asset(player, self._spools or {})
+        write_file(whole, self.growing, parts=segment_parts(whole))
 
     def _with_asset(self, player: Player, spools: Mapping[str, FieldSpool]) -> Bitstream:
         """The bitstream of a file with what lies beside its positions."""
@@ -177,13 +176,14 @@ class Recorder:
         return coder.add(encoded, make_codec(CODEC, self._settings, ()))
 
     def _show(self) -> None:
-        """Show what is there in a notebook, once."""
-        if self._view is not None or self._is_shown is False:
-            return
-        from gvpipe.recording.live_view import open_view
+        """Show what is there in a notebook."""
+        if self._view is not None:
+            self._view.grow()
+        elif self._is_shown is not False:
+            from gvpipe.recording.live_view import open_view
 
-        self._view = open_view(self.growing, self._is_shown)
-        self._is_shown = self._view is not None
+            self._view = open_view(self.growing, self._is_shown)
+            self._is_shown = self._view is not None
 
 
 def record(path: StrPath, faces: Any, fps: float = 30.0, **options: Any) -> Recorder:
