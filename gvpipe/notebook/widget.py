@@ -220,7 +220,7 @@ def read_range(prepared: Prepared, start: Any, stop: Any) -> bytes:
         FormatError: the file has changed.
     """
     size = prepared.source.size
-    stop = size if stop is None else stop
+    stop = max(size, start) if stop is None and isinstance(start, int) else stop
     if not (isinstance(start, int) and isinstance(stop, int) and 0 <= start <= stop):
         raise InputError(f"bytes {start} to {stop} were asked for; show the player again")
     return prepared.source.read(start, min(stop, size) - start) if start < size else b""

@@ -228,6 +228,36 @@ widget.read_range = lambda prepared, start, stop: asked.append((start, stop)) or
         run_cell(notebook, "prepared.MOST_AT_ONCE = 8 << 20; widget.read_range = read")
 
 
+def test_a_recording_shows_itself_while_it_grows(notebook: Any) -> None:
+    """The kernel is busy with the loop, and answers no page."""
+    in_player(notebook, "await jupyterapp.commands.execute('notebook:clear-all-cell-outputs');")
+    run_cell(notebook, "import time; frames = gvpipe.decode('sheet.mp4')")
+    loop = """with gvpipe.record('run.mp4', frames.faces, fps=10) as film:
+    for _ in range(3):
+        for frame in frames:
+            film.add(frame, height=frame[:, 2])
+            time.sleep(0.04)"""
+    state = in_player(
+        notebook,
+        """const notebook = jupyterapp.shell.currentWidget.content;
+        await jupyterapp.commands.execute("notebook:insert-cell-below");
+        notebook.activeCell.model.sharedModel.setSource(args[0]);
+        let isDone = false;
+        const done = jupyterapp.commands.execute("notebook:run-cell").then(() => (isDone = true));
+        const player = () => document.querySelector("geometry-video");
+        await until(() => player()?.video?.isLive);
+        const before = player().video.frameCount;
+        await until(() => player().video.frameCount > before);
+        const state = [isDone, player().video.frameCount, player().paused];
+        await done;
+        await until(() => player().readyState === 4 && player().video.isLive === false && player().video.fields.size);
+        return [...state, player().video.frameCount, [...player().video.fields.keys()]]""",
+        loop,
+    )
+    was_done, n_before, was_paused, n_frames, fields = state
+    assert not was_done and n_before < n_frames == 3 * N_FRAMES and not was_paused and fields == ["height"]
+
+
 def test_a_notebook_that_was_saved_shows_and_plays_without_a_kernel(
     notebook: Any, folder: Path, address: str, tmp_path: Path
 ) -> None:
