@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -158,6 +159,21 @@ def test_the_last_line_of_a_cell(parted: Path, kernel: list[dict[str, Any]]) -> 
         assert "application/vnd.jupyter.widget-view+json" in kernel.pop()
         assert shown is sequence or not kernel
     assert "encoded by pca" in kernel.pop()["text/plain"]
+
+
+def test_a_comparison_shows_both_sides(parted: Path, kernel: list[dict[str, Any]], tmp_path: Path) -> None:
+    source = gvpipe.decode(parted)
+    comparison = gvpipe.compare(source, parted)
+    assert pickle.loads(pickle.dumps(comparison)) == comparison and comparison.sides[0] is source
+    bundle = comparison._repr_mimebundle_()
+    assert bundle["text/html"].count("data-page") == 4 and "<polyline" in bundle["text/html"]
+    assert "SideBySide" in kernel[-1]["text/plain"]
+    kernel.clear()
+    for_ever = pickle.loads(pickle.dumps(comparison))
+    del source
+    for alone in (comparison, for_ever):  # nothing holds its source
+        bundle = alone._repr_mimebundle_()
+        assert "KG error" in bundle["text/html"] and "data-page" not in bundle["text/html"] and not kernel
 
 
 def test_where_there_is_no_player_there_is_a_still(
