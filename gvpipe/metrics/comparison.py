@@ -79,7 +79,7 @@ class Comparison:
     def _repr_html_(self) -> str:
         from gvpipe.metrics.comparison_page import comparison_html
 
-        return comparison_html(self)
+        return comparison_html(self.to_json())
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
         from gvpipe.model.notebook import mimebundle

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from gvpipe.metrics.comparison import Comparison
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 WIDTH, HEIGHT = 480, 110  # of the plot, pixels
 LINES = (("max", "#c2482f"), ("rmse", "#2f6fb3"))  # by frame, and their colours
@@ -22,19 +19,19 @@ SHOWN = {
 }
 
 
-def comparison_html(comparison: Comparison) -> str:
-    """A table of the numbers that have a meaning, and a plot of the errors over the frames."""
+def comparison_html(numbers: Mapping[str, Any]) -> str:
+    """A table of a comparison's numbers that have a meaning, and a plot of the errors over the frames."""
     rows = []
     for name, words in SHOWN.items():
-        value = getattr(comparison, name)
+        value = numbers[name]
         if value is not None:
             rows.append((words, f"{100 * value if name in PERCENT else value:.4g}"))
     for kind in ("attributes", "fields", "volume"):
-        for name, errors in getattr(comparison, kind).items():
+        for name, errors in numbers[kind].items():
             rows.append((f"{name}: largest error", f"{errors['max']:.4g}" if errors.get("max") is not None else "none"))
     cell = '<td style="text-align: left">{}</td>'
     table = "".join(f"<tr>{cell.format(html.escape(words))}{cell.format(value)}</tr>" for words, value in rows)
-    return f"<div><table>{table}</table>{_plot(comparison.frames)}</div>"
+    return f"<div><table>{table}</table>{_plot(numbers['frames'])}</div>"
 
 
 def _plot(frames: Sequence[dict[str, float]]) -> str:
