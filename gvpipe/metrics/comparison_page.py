@@ -31,7 +31,8 @@ def comparison_html(numbers: Mapping[str, Any]) -> str:
             rows.append((f"{name}: largest error", f"{errors['max']:.4g}" if errors.get("max") is not None else "none"))
     cell = '<td style="text-align: left">{}</td>'
     table = "".join(f"<tr>{cell.format(html.escape(words))}{cell.format(value)}</tr>" for words, value in rows)
-    return f"<div><table>{table}</table>{_plot(numbers['frames'])}</div>"
+    plot = _plot(numbers["frames"])
+    return f"<div><table>{table}</table>{plot}</div>"
 
 
 def _plot(frames: Sequence[dict[str, float]]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from ipywidgets import HBox, Layout, jslink
 
 from gvpipe.foundation.errors import InputError
-from gvpipe.notebook.widget import PlayerWidget, shown_above
+from gvpipe.notebook.widget import PlayerWidget, show_widget
 
 SHARED = ("frame", "playing", "speed", "camera")
 
@@ -36,10 +36,11 @@ class SideBySide(HBox):
         self._links = [jslink((first, name), (other, name)) for other in self.players[1:] for name in SHARED]
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
+        show_widget(self)
         kept = [player.saved() for player in self.players]
         pages = "".join(f'<div style="flex: 1; min-width: 0">{each["text/html"]}</div>' for each in kept)
         row = f'<div style="display: flex; gap: 1em">{pages}</div>'
-        return shown_above(self, {**kept[0], "text/html": row, "text/plain": repr(self)})
+        return {**kept[0], "text/html": row, "text/plain": repr(self)}
 
     def __repr__(self) -> str:
         return f"<SideBySide {', '.join(player.name for player in self.players)}>"

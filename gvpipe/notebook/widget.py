@@ -194,14 +194,15 @@ class PlayerWidget(anywidget.AnyWidget):
         return bundle if still is None else {**bundle, "image/png": still}
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
-        return shown_above(self, self.saved())
+        show_widget(self)
+        return self.saved()
 
     def __repr__(self) -> str:
         return f"<PlayerWidget {self.name}: frame {self.frame} of {len(self._prepared.player)}>"
 
 
-def shown_above(widget: Any, kept: dict[str, Any]) -> dict[str, Any]:
-    """Show a widget in an output of its own; return what is kept of it, which is the output below.
+def show_widget(widget: Any) -> None:
+    """Show a widget in an output of its own, above the one that is kept for saved notebooks.
 
     Viewers show of one output what they like best: the widget, even where there is no kernel to draw it.
     """
@@ -209,7 +210,6 @@ def shown_above(widget: Any, kept: dict[str, Any]) -> dict[str, Any]:
 
     view = {"version_major": 2, "version_minor": 0, "model_id": widget.model_id}
     display({WIDGET: view, "text/plain": repr(widget)}, raw=True)
-    return kept
 
 
 def read_range(prepared: Prepared, start: Any, stop: Any) -> bytes:

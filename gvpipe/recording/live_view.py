@@ -29,14 +29,14 @@ class LiveView:
     def __init__(self, path: Path) -> None:
         from IPython.display import display
 
-        from gvpipe.notebook.widget import PlayerWidget, shown_above
+        from gvpipe.notebook.widget import PlayerWidget, show_widget
 
         self._path, self._front = path, path.read_bytes()
         self._size = len(self._front)
         prepared = Prepared(path.name, Player(path, unlimited=True), BytesSource(self._front))
         self._widget = PlayerWidget(prepared, PageView(), loop=False, is_growing=True)
-        kept = {"text/html": "", "text/plain": ""}
-        self._handle: Any = display(shown_above(self._widget, kept), raw=True, display_id=True)
+        show_widget(self._widget)
+        self._handle: Any = display({"text/html": "", "text/plain": ""}, raw=True, display_id=True)
 
     def grow(self) -> None:
         """Send what has changed: the end, and in the front, of which the table has new rows."""

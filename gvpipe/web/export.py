@@ -12,6 +12,7 @@ is measured and reported.
 from __future__ import annotations
 
 import base64
+import functools
 import html
 import os
 import zlib
@@ -221,13 +222,19 @@ def page_text(name: str, data: bytes, up: str, view: PageView, more: Sequence[by
         "VIEW": view.attributes(),
         "NOTICE": (shipped / "LICENSES" / "NOTICE.txt").read_text("utf-8").strip(),
         "DIGITS": DIGITS,
-        "PLAYER": _base85(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),
+        "PLAYER": _player(),
         "VIDEO": _base64(data),
         "LOOP": "" if more else " loop",
         "MORE": _behind(more) if more else "",
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
     return "".join(values[part] if i % 2 else part for i, part in enumerate(parts))
+
+
+@functools.cache
+def _player() -> str:
+    """The player's bundle, as a page holds it."""
+    return _base85(zlib.compress((files("gvpipe.web") / "bundle" / "player.js").read_bytes(), 9))
 
 
 def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
