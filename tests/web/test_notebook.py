@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 import subprocess
@@ -14,8 +15,10 @@ import browsers
 import jupyter_lab
 import numpy as np
 import pytest
+from folders import DOCS
 from jupyter_lab import command, in_player, open_notebook, run_cell, write_notebook
 from pages import run
+from PIL import Image
 from sequences import waving
 
 import gvpipe
@@ -256,6 +259,21 @@ def test_a_recording_shows_itself_while_it_grows(notebook: Any) -> None:
     )
     was_done, n_before, was_paused, n_frames, fields = state
     assert not was_done and n_before < n_frames == 3 * N_FRAMES and not was_paused and fields == ["height"]
+
+
+def test_the_picture_of_the_documentation(
+    notebook: Any, folder: Path, request: pytest.FixtureRequest, samples: Path
+) -> None:
+    """A cell with the sample flag; ``--write-golden`` writes the picture that docs/notebooks.md shows."""
+    shutil.copy(samples / "flag.npz", folder)
+    _show(notebook, 'gvpipe.show("flag.npz", field="strain", colormap="viridis", autoplay=False)')
+    in_player(notebook, "await element.seek(20); element.closest('.jp-Cell').id = 'shown';")
+    shot = notebook.find_element("css selector", "#shown").screenshot_as_png
+    picture = Image.open(io.BytesIO(shot)).convert("RGB")
+    pixels = np.asarray(picture, int)
+    assert (pixels.max(axis=2) - pixels.min(axis=2) > 60).mean() > 0.03  # colours of the field
+    if request.config.getoption("--write-golden"):
+        picture.quantize(256).save(DOCS / "notebooks" / "player.png", optimize=True)
 
 
 def test_a_notebook_that_was_saved_shows_and_plays_without_a_kernel(
