@@ -545,7 +545,7 @@ def compare(
     if any(each.volume is not None for each in both):
         pairs = zip(given.values(), both, strict=True)
         both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-    return measure(both[0], both[1], progress)
+    return measure(both[0], both[1], progress).of(reference, distorted)
 
 
 def _as_sequence(given: MeshSequence | Player | Source, volume: bool = False) -> MeshSequence:
