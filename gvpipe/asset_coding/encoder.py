@@ -39,6 +39,7 @@ from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.reduction import NO_REDUCTION, Reduction
 from gvpipe.asset_coding.scan import WHOLE_KINDS, are_whole, longest_vector
+from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
 from gvpipe.asset_coding.times import SECTION as TIMES
 from gvpipe.asset_coding.times import pack_times
 from gvpipe.asset_coding.volume_encoder import Shown, VolumeCoder
@@ -147,12 +148,14 @@ class AssetCoder:
         volume = sequence.volume
         kept = {**self.plan.attributes, **self.plan.fields}
         self._volume = None if volume is None else VolumeCoder(sequence, volume, options, kept)
+        self.sound, self.sound_notes = whole_sound(sequence.sound)
+        self._companions = () if self.sound is None else (pack_sound(self.sound),)
         self._fields: dict[tuple[str, bytes], bytes] = {}
         self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing beside positions and triangles."""
+        """Whether there is nothing beside positions, triangles and a sound."""
         given = self._sequence
         is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
         return is_bare and given.polygons is None and given.volume is None and _with_losses(given) == NO_METADATA
@@ -167,7 +170,7 @@ class AssetCoder:
                 bitstream.
         """
         if self.is_empty:
-            return encoded.bitstream
+            return dataclasses.replace(encoded.bitstream, companions=self._companions)
         reader, same_bits = open_reader(encoded.bitstream), codec.same_bits
         permutation = np.asarray(encoded.permutation, np.int64)
         place = np.empty(len(permutation), np.int32)
@@ -205,6 +208,7 @@ class AssetCoder:
         return dataclasses.replace(
             encoded.bitstream,
             sections={**sections, SECTION: pack_directory(directory, len(permutation))},
+            companions=self._companions,
             outline=_with_counts(encoded.bitstream.outline, arrangement, len(parts)),
         )
 

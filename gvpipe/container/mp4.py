@@ -13,11 +13,12 @@ from another file is noticed::
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import os
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -35,13 +36,15 @@ from gvpipe.container.bitstream import (
     unpack_payload,
 )
 from gvpipe.container.boxes import BOX, LARGE, Box, uuid_head
+from gvpipe.container.companion import Described, alone, attach, describe, detach, geometry_of, read_described, whole
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.live_layout import read_live
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
 from gvpipe.container.shared_sections import FindSection
+from gvpipe.container.shot_layout import ShotIndex, read_shots
 from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_remote, is_url
-from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
+from gvpipe.container.stream_layout import ROOM_UUID, SHOTS_UUID, find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.budget import Budget
@@ -50,6 +53,7 @@ from gvpipe.foundation.errors import (
     FormatError,
     InputError,
     NotGeometryVideo,
+    SeveralShots,
     StrippedFile,
     TruncatedFile,
     corrupt,
@@ -114,18 +118,55 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False, find: FindS
 
     Raises:
         InputError: there is no such file, or it cannot be read.
-        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, MissingSection, OverBudget: see
-            `gvpipe.foundation.errors`.
+        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, MissingSection, OverBudget, SeveralShots:
+            see `gvpipe.foundation.errors`.
     """
     if is_remote(path):
         return _read_address(str(path), unlimited, find)
+    with _reading(path) as source, open(path, "rb") as file:
+        budget, index = Budget(None if unlimited else source.size), find_index(source)
+        return _read(file, source.size, budget, find) if index is None else _read_parts(source, index, budget)
+
+
+def read_index(path: str | os.PathLike[str], unlimited: bool = False) -> ShotIndex | None:
+    """The index of a capture's file, None of a file of one shot.
+
+    Args:
+        path: of the file, or its address.
+        unlimited: as of `read_file`.
+
+    Raises:
+        InputError, NewerVersion, TruncatedFile, CorruptFile, OverBudget: as `read_file`.
+    """
+    if is_remote(path):
+        budget = Budget(None if unlimited else 0)
+        with _within(str(path)):
+            return _shots_of(_source_at(str(path), budget), budget)
+    with _reading(path) as source:
+        return _shots_of(source, Budget(None if unlimited else source.size))
+
+
+def _shots_of(source: Source, budget: Budget) -> ShotIndex | None:
+    box = find_index(source)
+    return read_shots(source, box, budget) if box is not None and box.uuid == SHOTS_UUID.bytes else None
+
+
+@contextlib.contextmanager
+def _within(name: str) -> Iterator[None]:
+    """Errors name the file."""
+    try:
+        yield
+    except FormatError as exc:
+        raise exc.within(name) from exc
+
+
+@contextlib.contextmanager
+def _reading(path: str | os.PathLike[str]) -> Iterator[FileSource]:
+    """A file on disk; what cannot be read is one clear error that names it."""
     check_source(path)
     path = Path(path)
     try:
-        source = FileSource(path)
-        with open(path, "rb") as file:
-            budget, index = Budget(None if unlimited else source.size), find_index(source)
-            return _read(file, source.size, budget, find) if index is None else _read_parts(source, index, budget)
+        yield FileSource(path)
     except FormatError as exc:
         raise exc.within(str(path)) from exc
     except IsADirectoryError as exc:
@@ -138,16 +179,20 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False, find: FindS
 
 def read_bytes(data: bytes, name: str, unlimited: bool = False, find: FindSection | None = None) -> Bitstream:
     """As `read_file`, of a file in memory; messages call it ``name``."""
-    try:
-        source = BytesSource(data)
+    return read_source(BytesSource(data), name, unlimited, find)
+
+
+def read_source(source: Source, name: str, unlimited: bool = False, find: FindSection | None = None) -> Bitstream:
+    """As `read_file`, of any bytes, such as a shot of a capture; messages call them ``name``."""
+    with _within(name):
         budget, index = Budget(None if unlimited else source.size), find_index(source)
-        return _read(io.BytesIO(data), source.size, budget, find) if index is None else _read_parts(source, index, budget)
-    except FormatError as exc:
-        raise exc.within(name) from exc
+        if index is not None:
+            return _read_parts(source, index, budget)
+        return _read(io.BytesIO(source.read(0, source.size)), source.size, budget, find)
 
 
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
-    """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
+    """Bytes of the codec's sections, of the video's samples, of companions and of the rest, in a file of ``size`` bytes."""
     parts = dict(bitstream.section_sizes)
     fragments = bitstream.fragments
     if bitstream.is_unfinished:  # its poster is not read
@@ -156,11 +201,15 @@ def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
         parts["video"] = fragments.n_bytes
     elif bitstream.video:
         parts["video"] = inspect(bitstream.video, bitstream.budget).n_bytes
+    for companion in bitstream.companions:
+        parts[companion.kind] = parts.get(companion.kind, 0) + companion.n_bytes
     return {**parts, "container": size - sum(parts.values())}
 
 
 def load(bitstream: Bitstream) -> Bitstream:
     """The bitstream with all of its sections and its video in memory, checked as those of a file of the plain layout are.
+
+    Companions that are not whole are left out.
 
     Raises:
         CorruptFile: sections or pictures are not those that the header describes.
@@ -169,7 +218,9 @@ def load(bitstream: Bitstream) -> Bitstream:
     if fragments is None:
         return bitstream
     video = b"".join([fragments.head, *(fragments.read(number) for number in range(len(fragments.counts)))])
+    companions, lost = whole(bitstream.companions)
     loaded = replace(bitstream, sections=dict(bitstream.sections), video=video, fragments=None)
+    loaded = replace(loaded, companions=companions, lost=(*bitstream.lost, *lost))
     if f"{TAG_PREFIX}{VERSION} {_content_id(loaded)}".encode() not in fragments.head:
         raise corrupt("its geometry belongs to another file")
     return loaded
@@ -182,21 +233,25 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None, shared: Mapping[str,
         return _pack_bare(bitstream, shared)
     identity = _content_id(bitstream)
     track = inspect(bitstream.video)
-    extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration}
+    companions = bitstream.companions
+    extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration, **describe(companions)}
     if parts is not None:
-        video = remux_fragments(bitstream.video, f"{VERSION} {identity}")
-        return pack_stream(video, pack_header(bitstream, extra), bitstream.sections, parts)
+        fragmented = remux_fragments(bitstream.video, f"{VERSION} {identity}")
+        return pack_stream(fragmented, pack_header(bitstream, extra), bitstream.sections, parts, companions)
     payload = pack_payload(bitstream, extra)
-    return chain(remux(bitstream.video, f"{VERSION} {identity}"), [uuid_head(BOX_UUID, len(payload)), payload])
+    video = attach(remux(bitstream.video, f"{VERSION} {identity}"), companions)
+    return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
 
 def _pack_bare(bitstream: Bitstream, shared: Mapping[str, str] | None) -> Iterable[bytes]:
     """A file of the bare layout in parts."""
-    extra: dict[str, Any] = {}
-    video: Iterable[bytes] = [bare.NO_TRACKS]
+    companions = bitstream.companions
+    extra: dict[str, Any] = describe(companions)
+    video: Iterable[bytes] = alone(companions) if companions else [bare.NO_TRACKS]
     if bitstream.video:
-        track, video = inspect(bitstream.video), remux(bitstream.video)
-        extra = {"video_crc32": track.checksum, "track_crc32": track.configuration}
+        video = attach(remux(bitstream.video), companions)
+        track = inspect(bitstream.video)
+        extra = {"video_crc32": track.checksum, "track_crc32": track.configuration, **extra}
     payload = bare.pack_bare(bitstream, extra, shared)
     return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
@@ -229,7 +284,13 @@ def _source_at(url: str, budget: Budget) -> HttpSource | StoreSource:
 
 
 def _read_parts(source: Source, index: Box, budget: Budget) -> Bitstream:
-    """Read a file in the stream layout, finished or not."""
+    """Read a file in the stream layout, finished or not; raises `SeveralShots` for a capture."""
+    if index.uuid == SHOTS_UUID.bytes:
+        count = len(read_shots(source, index, budget).frames)
+        raise SeveralShots(
+            f"it is a capture of {count} shots, each with vertices and triangles of its own",
+            "open it by gvpipe.open_capture, read a shot by its frames, or make a file of each: gvpipe decode",
+        )
     return (read_live if index.uuid == ROOM_UUID.bytes else read_stream)(source, index, budget)
 
 
@@ -247,8 +308,9 @@ def _read(file: IO[bytes], size: int, budget: Budget, find: FindSection | None) 
         bitstream, header = bare.unpack_bare(payload, budget, find)
         return _with_pictures(replace(bitstream, n_bytes=size + bitstream.n_bytes), header, video, layout)
     check_payload_version(payload)
-    check_tables(video[slice(*layout.moov)], layout.video_end)
-    track = inspect(video, budget)
+    own = geometry_of(video)
+    check_tables(own[slice(*layout.moov)], layout.video_end)
+    track = inspect(own, budget)
     tag = track.tag
     version = tag.partition(" ")[0]
     if version.isascii() and version.isdecimal() and len(version) < 10:
@@ -258,6 +320,9 @@ def _read(file: IO[bytes], size: int, budget: Budget, find: FindSection | None) 
     if container.text("id") != identity or (tag and tag.split()[-1] != identity):
         raise corrupt("its geometry belongs to another file")
     _check_track(container, track)
+    described = read_described(container)
+    if described or own is not video:
+        return _with_companions(replace(bitstream, n_bytes=size), video, described, n_own=1)
     return replace(bitstream, video=video, n_bytes=size)
 
 
@@ -267,9 +332,22 @@ def _with_pictures(bitstream: Bitstream, header: JsonObject, video: bytes, layou
         if video != bare.NO_TRACKS:
             raise corrupt("it has a video that its header does not describe")
         return bitstream
-    check_tables(video[slice(*layout.moov)], layout.video_end)
-    _check_track(header.object("container"), inspect(video, bitstream.budget))
+    container = header.object("container")
+    described = read_described(container)
+    n_own = int("video_crc32" in container or not described)
+    own = geometry_of(video) if n_own else b""
+    if n_own:
+        check_tables(own[slice(*layout.moov)], layout.video_end)
+        _check_track(container, inspect(own, bitstream.budget))
+    if described or own is not video:
+        return _with_companions(bitstream, video, described, n_own)
     return replace(bitstream, video=video)
+
+
+def _with_companions(bitstream: Bitstream, video: bytes, described: list[Described], n_own: int) -> Bitstream:
+    """A file's bitstream with its video and its companions, as far as these are whole."""
+    found = detach(video, described, n_own)
+    return replace(bitstream, video=found.video, companions=found.companions, lost=found.lost)
 
 
 def _check_track(container: JsonObject, track: Track) -> None:
