@@ -24,8 +24,9 @@ from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare
 from gvpipe.metrics.hausdorff import Hausdorff
 from gvpipe.metrics.pairing import Unpaired, pair_vertices
 from gvpipe.metrics.sted import Sted
-from gvpipe.metrics.surface_comparison import SequenceSurfaces, SurfaceComparison, compare_surfaces
+from gvpipe.metrics.surface_comparison import CaptureSurfaces, SequenceSurfaces, SurfaceComparison, compare_surfaces
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 FramesDone = Callable[[int, int], None]
@@ -117,6 +118,17 @@ def compare(
         raise InputError(f"{reference.name} has no triangles, so that there are no surfaces to compare; compare vertices alone")
     errors = _compare_vertices(reference, distorted, pairing, _half(progress, 0))
     return replace(errors, surface=_surfaces(reference, distorted, _half(progress, 1)))
+
+
+def compare_captures(reference: Capture, distorted: Capture, progress: FramesDone | None = None) -> Comparison:
+    """Measure two animations whose vertices or triangles change, by their surfaces.
+
+    Raises:
+        InputError: they differ in their number of frames, or one side of a frame has no triangles.
+    """
+    surface = compare_surfaces(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress)
+    changing = reference if len(reference.shots) > 1 else distorted
+    return replace(NOTHING, surface=surface, unpaired=f"vertices or triangles of {changing.name} change")
 
 
 def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
