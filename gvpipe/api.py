@@ -174,7 +174,7 @@ def encode(
     scheduler: str | None = None,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = None,
     audio: StrPath | Sound | bool | None = None,
     audio_codec: str | None = None,
     audio_bitrate: int | None = None,
@@ -209,7 +209,9 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp, volume: as for `read`. The volume of a sequence is always coded.
+        clip, mesh, frames, unlimited, real_time, warp: as for `read`.
+        volume: whether what lies inside of a simulation's surface is coded, too. None: of a sequence or a geometry video, yes;
+            of other files, if it takes less than a third of the other bytes. A note says what was chosen.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
@@ -244,26 +246,29 @@ def encode(
     layout = STREAM if stream else BARE if bare else PLAIN
     with open_executor(scheduler, workers) as executor:
         options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
-        options |= {"real_time": real_time, "warp": warp, "volume": volume}
+        options |= {"real_time": real_time, "warp": warp}
         beside = AssetOptions.of(attributes, fields, textures)
         if isinstance(source, Capture):
             capture = _some_of(source, frames, fps)
             return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
         try:
-            sequence = with_sound(_open_source(source, path, fps, options), sounds, frames)
+            sequence, spares_volume, chosen = _open_with_inside(source, path, fps, options, volume)
+            sequence = with_sound(sequence, sounds, frames)
+            options["volume"] = sequence.volume is not None
             if memory is not None:
                 given = fit_segments(given, sequence.n_vertices, memory)
             target = _target(sequence, *request.targets)
-            asset = AssetCoder(sequence, beside)
+            asset = AssetCoder(sequence, dataclasses.replace(beside, spares_volume=spares_volume))
             with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
                 coded = _code(sequence, given, target, asset, bare, clock)
         except TopologyChange:
             if isinstance(source, MeshSequence):
                 raise
-            capture = read_capture(source, fps, **options)
+            capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
             return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
     size, bitstream = _write(sequence, coded, path, clock, layout)
     clock("", 1.0)
+    chosen += () if asset.volume_choice is None else (asset.volume_choice.note,)
     return Report(
         codec=coded.codec.id,
         settings=dataclasses.asdict(coded.codec),
@@ -274,11 +279,11 @@ def encode(
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
-        not_carried=[*sorted(asset.plan.left_out), *sequence.not_carried],
+        not_carried=[*sorted(asset.plan.left_out), *asset.carried.not_carried],
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *_refusal(path, bitstream, size)],
+        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *chosen, *_refusal(path, bitstream, size)],
         audio=None if asset.sound is None else asset.sound.to_json(),
         errors={} if coded.errors is None else dataclasses.asdict(coded.errors),
     )
@@ -550,7 +555,7 @@ def compare(
         if any(each.volume is not None for each in both):
             pairs = zip((reference, distorted), both, strict=True)
             both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-        return measure(both[0], both[1], progress, surface=surface)
+        return measure(both[0], both[1], progress, surface=surface).of(reference, distorted)
     except TopologyChange:
         if surface is False:
             raise
@@ -802,6 +807,26 @@ def _open_source(
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
     return read(source, fps, **options)
+
+
+def _open_with_inside(
+    source: MeshSequence | Source, path: StrPath, fps: float | None, options: dict[str, Any], volume: bool | None
+) -> tuple[MeshSequence, bool, tuple[str, ...]]:
+    """The sequence to encode, whether its volume is left out where it costs too much, and a note on what was chosen by now."""
+    from gvpipe.asset_coding.volume_choice import MOST_NUMBERS, count_note, times_the_surface, without_volume
+
+    sequence = _open_source(source, path, fps, {**options, "volume": bool(volume)})
+    if volume is False:
+        return without_volume(sequence), False, ()
+    times = times_the_surface(sequence)
+    if volume or isinstance(source, MeshSequence) or times is None or sequence.volume is not None:
+        return sequence, False, ()
+    if times > MOST_NUMBERS:
+        return sequence, False, (count_note(times),)
+    try:
+        return read(source, fps, **{**options, "volume": True}), True, ()
+    except InputError:  # of what lies inside alone
+        return sequence, False, ()
 
 
 @contextlib.contextmanager

@@ -144,7 +144,8 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         if split:
-            runs = files.read_runs(source, **asked.reading, unlimited=asked.unlimited)
+            reading = {**asked.reading, "volume": bool(asked.reading["volume"])}
+            runs = files.read_runs(source, **reading, unlimited=asked.unlimited)
             runs = with_sounds(runs, sound, asked.reading["frames"])
             written = write_runs(
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
