@@ -498,18 +498,24 @@ def compare(
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         read_given = partial(files.read, one, fps, clip, its_mesh, span, unlimited=unlimited)
         read_other = partial(files.read, other, None, other_clip, other_mesh, unlimited=unlimited)
-        given = read_given()
-        compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-        if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
-            read_other = partial(read_other, volume=True)
-            given = given if given.volume is not None else read_given(volume=True)
+
+        def show_progress(done: int, of: int) -> None:
+            if progress:
+                progress("compare", done / of)
+
+        try:
+            given = read_given()
             compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-        result = comparison.compare(
-            given,
-            compared,
-            lambda done, of: progress("compare", done / of) if progress else None,
-            surface=surface or None,
-        )
+            if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
+                read_other = partial(read_other, volume=True)
+                given = given if given.volume is not None else read_given(volume=True)
+                compared = read_other() if span is None else _same_frames(read_other, span, len(given))
+            result = comparison.compare(given, compared, show_progress, surface=surface or None)
+        except TopologyChange:
+            capture = files.read_capture(one, fps, clip, its_mesh, span, unlimited=unlimited)
+            whole = files.read_capture(other, None, other_clip, other_mesh, unlimited=unlimited)
+            part = whole if span is None or len(whole) == len(capture) else whole.part(*span)
+            result = comparison.compare_captures(capture, part, show_progress)
     values = result.to_json()
     out.json(values)
     if result.unpaired:

@@ -10,10 +10,11 @@ and R. Klein, Simple and efficient compression of animation sequences, 2005 (``d
 
 from __future__ import annotations
 
+import math
 import os
 import weakref
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,9 @@ from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare
 from gvpipe.metrics.correspondence import canonical_triangles, match_vertices
 from gvpipe.metrics.hausdorff import Hausdorff
 from gvpipe.metrics.sted import Sted
+from gvpipe.metrics.surface_comparison import CaptureSurfaces, SequenceSurfaces, SurfaceComparison, compare_surfaces
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 FramesDone = Callable[[int, int], None]
@@ -116,7 +119,45 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
     for role, given in (("reference", reference), ("distorted", distorted)):
         if not isinstance(given, MeshSequence):
             raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence is needed, such as gvpipe.read(path)")
-    given, pairing = distorted, pair_vertices(reference, distorted)
+    has_surfaces = bool(len(reference.faces) and len(distorted.faces))
+    try:
+        pairing = pair_vertices(reference, distorted)
+    except Unpaired as exc:
+        if surface is False or not has_surfaces:
+            raise
+        return replace(NOTHING, surface=_surfaces(reference, distorted, progress), unpaired=str(exc))
+    if not surface:
+        return _compare_vertices(reference, distorted, pairing, progress)
+    if not has_surfaces:
+        raise InputError(f"{reference.name} has no triangles, so that there are no surfaces to compare; compare vertices alone")
+    errors = _compare_vertices(reference, distorted, pairing, _half(progress, 0))
+    return replace(errors, surface=_surfaces(reference, distorted, _half(progress, 1)))
+
+
+def compare_captures(reference: Capture, distorted: Capture, progress: FramesDone | None = None) -> Comparison:
+    """Measure two animations whose vertices or triangles change, by their surfaces.
+
+    Raises:
+        InputError: they differ in their number of frames, or one side of a frame has no triangles.
+    """
+    surface = compare_surfaces(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress)
+    changing = reference if len(reference.shots) > 1 else distorted
+    return replace(NOTHING, surface=surface, unpaired=f"vertices or triangles of {changing.name} change")
+
+
+def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
+    """Progress of the first (0) or second (1) walk through all frames."""
+    return None if progress is None else lambda done, of: progress(done + half * of, 2 * of)
+
+
+def _surfaces(reference: MeshSequence, distorted: MeshSequence, progress: FramesDone | None) -> SurfaceComparison:
+    return compare_surfaces(SequenceSurfaces(reference), SequenceSurfaces(distorted), progress)
+
+
+def _compare_vertices(
+    reference: MeshSequence, distorted: MeshSequence, pairing: Integers | None, progress: FramesDone | None
+) -> Comparison:
+    given = distorted
     distorted = distorted if pairing is None else distorted.reordered(np.argsort(pairing), reference.faces)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)

@@ -16,6 +16,7 @@ from gvpipe.foundation.arrays import Float64, Integers
 from gvpipe.foundation.errors import InputError
 from gvpipe.metrics.point_clouds import BEST_PSNR, GRID
 from gvpipe.metrics.surface import SAMPLES, Scale, Surface, SurfaceErrors, measure, scale_of
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 FramesDone = Callable[[int, int], None]
@@ -52,6 +53,21 @@ class SequenceSurfaces:
             self._start, stop = next(span for span in self._spans if span[0] <= k < span[1])
             self._block = self._sequence.read_absolute(self._start, stop)
         return self._block[k - self._start], self._sequence.faces
+
+
+class CaptureSurfaces:
+    """The frames of a `Capture`, whose shots have a connectivity each."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture, self.name, self.n_frames = capture, capture.name, len(capture)
+        self._number, self._shot = -1, SequenceSurfaces(capture.shots[0])
+
+    def frame(self, k: int) -> tuple[Float64, Integers]:
+        """Points and triangles of frame k, as `Surfaces` has it."""
+        number, own = self._capture.locate(k)
+        if number != self._number:
+            self._number, self._shot = number, SequenceSurfaces(self._capture.shots[number])
+        return self._shot.frame(own)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,9 @@ import pytest
 from gltf_files import two_clips
 
 import gvpipe
+from gvpipe.foundation.errors import TopologyChange
 from gvpipe.metrics import surface_comparison
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -45,13 +47,26 @@ def test_frames(run: Run, pair: tuple[Path, Path], sequence: MeshSequence, tmp_p
     assert ended.status == 1 and f"{pair[0]}: frames 5:2 asked for; 0 <= start < stop <= {len(sequence)} is needed" in ended.err
 
 
-def test_frames_of_one_topology(run: Run, sequence: MeshSequence, tmp_path: Path) -> None:
+def test_frames_of_one_topology(run: Run, sequence: MeshSequence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Frame 2 of both sides has other triangles; the others are compared."""
     for name in ("a", "b"):
         gvpipe.write(sequence, tmp_path / name / "%02d.ply")
         gvpipe.write(replace(sequence, positions=sequence[:1], faces=sequence.faces[:-1]), tmp_path / name / "02.ply")
     assert errors(run, tmp_path / "a", tmp_path / "b", "--frames", "3:6") == [0, 0, 0]
-    assert run("compare", tmp_path / "a", tmp_path / "b").status == 1
+    monkeypatch.setattr(surface_comparison, "SAMPLES", 500)
+    monkeypatch.setattr(surface_comparison, "GRID", 32)
+    ended = run("compare", tmp_path / "a", tmp_path / "b", "--json")
+    found = json.loads(ended.out)
+    assert ended.status == 0 and found["rmse"] is None and "change" in found["unpaired"]
+    assert len(found["surface"]["frames"]) == len(sequence) and found["surface"]["max"] < 1e-6
+    assert gvpipe.compare(tmp_path / "a", tmp_path / "b").surface is not None
+    capture = Capture([sequence.part(0, 5), sequence.part(5, len(sequence))])
+    with_capture = gvpipe.compare(capture, sequence).surface
+    assert with_capture is not None and with_capture.max < 1e-6 and len(with_capture.frames) == len(sequence)
+    span = json.loads(run("compare", tmp_path / "a", tmp_path / "b", "--frames", "1:4", "--json").out)
+    assert len(span["surface"]["frames"]) == 3
+    with pytest.raises(TopologyChange):
+        gvpipe.compare(tmp_path / "a", tmp_path / "b", surface=False)
 
 
 def test_point_caches(run: Run, pair: tuple[Path, Path], tmp_path: Path) -> None:

@@ -51,6 +51,7 @@ def test_surfaces_are_compared_where_vertices_do_not_correspond() -> None:
     assert errors.to_json()["rmse"] is errors.to_json()["max"] is None
     assert errors.frames == [] and errors.attributes == errors.fields == errors.volume == {}
     assert errors.unpaired.startswith("a has 4 vertices, b has 5")
+    assert "root mean square distance of the surfaces" in errors._repr_html_() and "at most 1 model" in errors._repr_html_()
     found = errors.surface
     assert found is not None
     assert (found.rms, found.p99, found.max, found.d1_mse, found.d2_mse) == (0.75, 0.75, 1, 0.625, 0.625)
