@@ -512,8 +512,10 @@ def compare(
     reference: MeshSequence | Capture | Player | CapturePlayer | Source,
     distorted: MeshSequence | Capture | Player | CapturePlayer | Source,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    surface: bool | None = None,
 ) -> Comparison:
-    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+    """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
     Args:
         reference: the original, a capture, a player, or what `read` takes; lengths are divided by its size. Where one of both
