@@ -103,7 +103,7 @@ def read_frame(frames: MeshFrames, frame: int) -> tuple[Float64, Int32]:
 
 
 def _diagonal(frames: MeshFrames) -> float:
-    """Of the box of the first frame that has one, model units."""
+    """The diagonal of the box of the first frame that has one, model units."""
     for frame in range(len(frames)):
         points = read_frame(frames, frame)[0]
         length = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
