@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
+    from gvpipe.notebook import show
     from gvpipe.playback.capture_player import CapturePlayer
     from gvpipe.playback.files import read, read_capture, write
     from gvpipe.playback.live import LiveEncoder, open_live
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from gvpipe.playback.video_info import Info, info
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
+    from gvpipe.recording import Recorder, RigidParts, record
     from gvpipe.web import ExportReport, export_html
 
 __all__ = [
@@ -62,9 +64,11 @@ __all__ = [
     "Metadata",
     "Part",
     "Player",
+    "Recorder",
     "Renderer",
     "Report",
     "Restreamed",
+    "RigidParts",
     "Skin",
     "Sound",
     "Texture",
@@ -83,8 +87,10 @@ __all__ = [
     "read",
     "read_capture",
     "read_sound",
+    "record",
     "render",
     "restream",
+    "show",
     "skin",
     "write",
 ]
@@ -101,6 +107,7 @@ _HOMES = {
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
+    "gvpipe.notebook": ("show",),
     "gvpipe.playback.capture_player": ("CapturePlayer",),
     "gvpipe.playback.files": ("read", "read_capture", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
@@ -113,6 +120,7 @@ _HOMES = {
     "gvpipe.model.capture": ("Capture",),
     "gvpipe.model.sequence": ("MeshSequence",),
     "gvpipe.model.skin": ("Skin",),
+    "gvpipe.recording": ("Recorder", "RigidParts", "record"),
     "gvpipe.playback.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }

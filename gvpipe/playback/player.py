@@ -90,6 +90,11 @@ class Player:
         return partial(type(self), unlimited=self._unlimited, data=self._data, shared=self._find), (self._absolute,)
 
     @property
+    def on_disk(self) -> str | None:
+        """Absolute path of the file; None for one in memory, or at an address."""
+        return None if self._data is not None or is_remote(self.path) else self._absolute
+
+    @property
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles."""
         with in_file(self.path):
@@ -283,6 +288,11 @@ class Player:
         numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
         numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
         return card(self.path, numbers, sequence)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
 
     def __enter__(self) -> Player:
         return self

@@ -12,6 +12,7 @@ is measured and reported.
 from __future__ import annotations
 
 import base64
+import functools
 import html
 import os
 import zlib
@@ -208,7 +209,16 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
+def page_text(name: str, data: bytes, up: str, view: PageView, more: Sequence[bytes] = ()) -> str:
+    """A page that plays a geometry video.
+
+    Args:
+        name: path of the file, whose stem is the page's title.
+        data: of the file.
+        up: the axis that stands upright in the first view.
+        view: how it opens.
+        more: files that play behind it.
+    """
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
@@ -217,13 +227,23 @@ def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, m
         "VIEW": view.attributes(),
         "NOTICE": (shipped / "LICENSES" / "NOTICE.txt").read_text("utf-8").strip(),
         "DIGITS": DIGITS,
-        "PLAYER": _base85(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),
+        "PLAYER": _player(),
         "VIDEO": _base64(data),
         "LOOP": "" if more else " loop",
         "MORE": _behind(more) if more else "",
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
-    text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
+    return "".join(values[part] if i % 2 else part for i, part in enumerate(parts))
+
+
+@functools.cache
+def _player() -> str:
+    """The player's bundle, as a page holds it."""
+    return _base85(zlib.compress((files("gvpipe.web") / "bundle" / "player.js").read_bytes(), 9))
+
+
+def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
+    text = page_text(name, data, up, view, more).encode()
     with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data) + sum(map(len, more)))

@@ -9,6 +9,10 @@ export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, 
   ready: CustomEvent<null>;
   /** The number of the frame that is shown. */
   frame: CustomEvent<number>;
+  /** Azimuth and elevation, degrees, that a user or `turnTo` turned to. */
+  viewchange: CustomEvent<[number, number]>;
+  /** Names of the parts that are hidden, after a choice in the menu. */
+  partschange: CustomEvent<string[]>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
   /** The cut that is shown, or null. */
@@ -82,6 +86,10 @@ export class GeometryVideoElement extends HTMLElement {
   readonly section: Float32Array;
   /** Azimuth and elevation of the first view, degrees, or null: the player's own; attribute `camera`. */
   readonly camera: [number, number] | null;
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  readonly view: [number, number] | null;
+  /** Turns the camera about its target; degrees. */
+  turnTo(azimuth: number, elevation: number): void;
   readonly hiddenParts: Set<string>;
   /** Hides the parts of these names, and shows all others. */
   hide(names: string | Iterable<string>): void;

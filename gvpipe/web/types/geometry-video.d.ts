@@ -1,6 +1,13 @@
 /** A geometry video: its mesh, and the positions of any frame. */
 
-export type Source = string | URL | Blob | ArrayBuffer | Uint8Array;
+/** A file whose bytes a function gives, fewer where it ends; `stop` may be Infinity. */
+export interface RangeSource {
+  /** For messages. */
+  readonly name: string;
+  fetchRange(start: number, stop: number, signal: AbortSignal): Promise<{ data: Uint8Array; size: number }>;
+}
+
+export type Source = string | URL | Blob | ArrayBuffer | Uint8Array | RangeSource;
 export type Domain = "vertex" | "corner" | "triangle" | "part";
 export type Kind = "uv" | "normal" | "tangent" | "color" | "scalar" | "vector" | "label";
 export type Values =

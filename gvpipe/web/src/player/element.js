@@ -9,7 +9,8 @@
  * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up), `muted`, `volume` (0 to 1).
  * Frames follow the sound's clock while it is heard. Browsers let a page play on its own only if it is `muted`.
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on),
+ * the frame's number), `viewchange` (detail: azimuth and elevation that a user turned to), `partschange` (detail: names of
+ * hidden parts), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on),
  * `clip` (detail: the cut that is shown, or null); `error` has a `GeometryVideoError` as its detail.
  */
 
@@ -70,6 +71,7 @@ export class GeometryVideoElement extends Base {
   #probe;
   #loading = null; // Load
   #loaded = null; // promise, while a file is loaded
+  #given = null; // what was loaded last, as it was given
   #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
   #isReady = false; // whether a file is loaded, and said to be
   #giveUps = new Set(); // reject what waits for that to play
@@ -105,7 +107,10 @@ export class GeometryVideoElement extends Base {
       colormap: (name) => this.setAttribute("colormap", name),
       warp: (name, scale) => this.setAttribute("warp", `${name}:${scale}`),
       clip: (change) => this.#changeClip(change),
-      hide: (names) => this.hide(names),
+      hide: (names) => {
+        this.hide(names);
+        this.#tell("partschange", [...names]);
+      },
     });
     this.#legend = new Legend(root.querySelector(".legend"));
     this.#probe = new Probe(root.querySelector(".probe"), (vertex) => this.#stage?.setMark(vertex));
@@ -117,7 +122,8 @@ export class GeometryVideoElement extends Base {
   }
 
   connectedCallback() {
-    if (this.hasAttribute("src") && !this.#loaded) this.load(this.getAttribute("src"));
+    const source = this.#given ?? this.getAttribute("src");
+    if (source !== null && !this.#loaded) this.load(source); // anew, where it was taken out of the page
   }
 
   disconnectedCallback() {
@@ -140,7 +146,8 @@ export class GeometryVideoElement extends Base {
   }
 
   attributeChangedCallback(name, before, value) {
-    if (name === "src" && this.isConnected && value !== null && (before !== value || this.error)) this.load(value);
+    if (name === "src" && !this.isConnected) this.#given = null;
+    else if (name === "src" && value !== null && (before !== value || this.error)) this.load(value);
     if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
@@ -323,6 +330,16 @@ export class GeometryVideoElement extends Base {
     return this.#mesh?.section ?? new Float32Array(0);
   }
 
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  get view() {
+    return this.#mesh ? this.#stage.angles : null;
+  }
+
+  /** Turn the camera about the middle of the picture. @param {number} azimuth @param {number} elevation degrees */
+  turnTo(azimuth, elevation) {
+    if (this.#mesh) this.#stage.turnTo([azimuth, elevation]);
+  }
+
   /** Names of the parts that are hidden. */
   get hiddenParts() {
     return new Set(this.#hidden);
@@ -344,6 +361,7 @@ export class GeometryVideoElement extends Base {
   /** Load and show a file: an address, `#id`, or the file itself; without one, `src` anew. Errors are shown in the element. */
   load(source = this.src) {
     this.#unload();
+    this.#given = source;
     this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
     let end;
     this.#loaded = new Promise((resolve) => (end = resolve)); // there before any listener is told
@@ -417,6 +435,7 @@ export class GeometryVideoElement extends Base {
     canvas.addEventListener("webglcontextrestored", () => this.#say(""));
     const stage = openStage(canvas);
     stage.cutMoved = (place) => this.#changeClip({ place });
+    stage.turned = () => this.#tell("viewchange", stage.angles);
     return stage;
   }
 

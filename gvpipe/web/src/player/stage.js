@@ -54,7 +54,10 @@ export class Stage {
     this.scene.add(this.handle);
     this.cutMoved = () => {}; // called with where the cut is dragged to, model units
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", () => this.requestRender());
+    this.controls.addEventListener("change", () => {
+      this.requestRender();
+      if (!this.isFramed) this.turned();
+    });
     this.controls.addEventListener("start", () => (this.isFramed = false));
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
@@ -65,6 +68,7 @@ export class Stage {
     this.mark.geometry.setAttribute("position", new BufferAttribute(new Float32Array(3), 3));
     Object.assign(this.mark, { visible: false, frustumCulled: false, renderOrder: 1 });
     this.scene.add(this.mark);
+    this.turned = () => {}; // called when a user turns the camera
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.size = ""; // of the picture, as it is
@@ -117,6 +121,21 @@ export class Stage {
   setFlatShading(isFlat) {
     this.mesh?.setFlatShading(isFlat);
     this.requestRender();
+  }
+
+  /** Azimuth and elevation of the view as it is, degrees, as of `gvpipe.render`. */
+  get angles() {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const { x, y, z } = offset;
+    const [rise, turn] = this.camera.up.z ? [z, Math.atan2(x, -y)] : [y, Math.atan2(x, z)];
+    return [turn, Math.asin(rise / (offset.length() || 1))].map((angle) => (angle * 180) / Math.PI);
+  }
+
+  /** Turn the camera about its target, from where it is. @param {[number, number]} view azimuth and elevation, degrees */
+  turnTo(view) {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    this.camera.position.copy(this.#direction(view)).multiplyScalar(distance).add(this.controls.target);
+    this.#moved();
   }
 
   /** Where the first view looks from. @param {[number, number]|null} view azimuth and elevation, degrees, as of `gvpipe.render` */
@@ -202,13 +221,7 @@ export class Stage {
 
   /** Look from where the first view does at the whole motion, or at the mesh that is followed. */
   resetView() {
-    const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
-    const front = new Vector3(...upright.slice(0, 3));
-    const up = new Vector3(...upright.slice(3));
-    const [azimuth, steep] = this.view;
-    const [turn, rise] = [azimuth, Math.min(STEEPEST, Math.max(-STEEPEST, steep))].map((degrees) => (degrees * Math.PI) / 180);
-    const direction = front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise));
-    direction.applyAxisAngle(up, turn);
+    const direction = this.#direction(this.view);
     this.box = this.#motion();
     this.middle = this.isFollowing ? this.#findMiddle() : this.box.getCenter(new Vector3());
     const half = this.isFollowing ? this.#findReach(this.middle) : this.box.getSize(new Vector3()).divideScalar(2).toArray();
@@ -300,6 +313,15 @@ export class Stage {
     const { min, max } = this.mesh.bounds;
     const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
     return new Box3(low, high);
+  }
+
+  /** Of unit length, from the target to the camera. @param {[number, number]} view azimuth and elevation, degrees */
+  #direction([azimuth, steep]) {
+    const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
+    const front = new Vector3(...upright.slice(0, 3));
+    const up = new Vector3(...upright.slice(3));
+    const [turn, rise] = [azimuth, Math.min(STEEPEST, Math.max(-STEEPEST, steep))].map((degrees) => (degrees * Math.PI) / 180);
+    return front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise)).applyAxisAngle(up, turn);
   }
 
   #findUsed() {
