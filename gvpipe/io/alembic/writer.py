@@ -45,6 +45,13 @@ def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]
     meshes = export_meshes(sequence, name)
     normals = SceneNormals(sequence, "Alembic")
     taken = _write_archive(sequence, meshes, normals, str(path))  # the library closes the file when its objects are gone
+    return notes_of(sequence, meshes, normals, taken)
+
+
+def notes_of(
+    sequence: MeshSequence, meshes: list[ExportMesh], normals: SceneNormals, taken: list[tuple[str, str]]
+) -> tuple[str, ...]:
+    """What Alembic cannot hold of a sequence; ``taken`` has the old and the new names of nodes whose names others had."""
     return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence, taken))
 
 

@@ -48,17 +48,18 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: it is no such list, names a file that is missing or lies outside its folder, or a file cannot be read.
     """
     with reading(path, path.suffix[1:], remedy="save it again"):
-        listed, parts = _read_list(path)
+        listed, parts = options.keep("list", lambda: _read_list(path))
         if len(parts) > 1:
-            return read_steps(_PartSteps(path, listed, parts), path, options)
+            return read_steps(options.keep("steps", lambda: _PartSteps(path, listed, parts)), path, options)
         start, stop = options.span(len(listed), str(path))
+        files = options.keep("files", lambda: _files(path, listed if options.memory else listed[start:stop]))
+        files = files[start:stop] if options.memory else files
         listed = listed[start:stop]
-        files = [side_file(path, name, "step", later=True) for _, name, _ in listed]
         n_empty = _count_empty(files) if options.frames is None else 0
         files, listed, start = files[n_empty:], listed[n_empty:], start + n_empty
     times = np.array([time for time, _, _ in listed], np.float64)
     if options.volume and len({file.suffix.lower() for file in files}) == 1:
-        steps = read_steps(FileSteps(files, times), path, replace(options, frames=None))
+        steps = read_steps(FileSteps(files, times), path, replace(options, frames=None, memory=None))
         return replace(steps, notes=(*empty_note(n_empty), *steps.notes))
     return read_listed(files, times, path, options, start, empty_note(n_empty))
 
@@ -94,9 +95,9 @@ def read_listed(
     suffixes = {file.suffix.lower() for file in files}
     if len(suffixes) > 1 or not suffixes <= set(STEPS):
         raise InputError(f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEPS)} are needed")
-    frames = FrameFiles(files, start)
+    frames = FrameFiles(files, start, options.memory is not None)
     first, columns = frames.first, split_columns(frames)
-    timing = time_steps(times, len(files), options.fps, options.real_time)
+    timing = time_steps(times[: len(frames.paths)], len(frames.paths), options.fps, options.real_time)
     metadata = replace(first.metadata, start_time=timing.start, source=path.name, times=timing.times)
     return MeshSequence(
         frames,
@@ -141,6 +142,10 @@ class _PartSteps:
                 raise ValueError(f"it lists {file.name!r}; files of {', '.join(STEPS)} are needed")
             found.append((part, dataset_loader(file.suffix.lower())(file)))
         return join_blocks(found)
+
+
+def _files(path: Path, listed: list[Listed]) -> list[Path]:
+    return [side_file(path, name, "step", later=True) for _, name, _ in listed]
 
 
 def _count_empty(files: list[Path]) -> int:

@@ -46,10 +46,14 @@ def read_vtkhdf(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: h5py is missing, it is no such file, it is damaged, or its data set is of another kind.
     """
-    file = open_hdf(path)
+    file = options.keep("file", lambda: open_hdf(path))
     with reading(path, "VTKHDF"):
-        steps = BlockSteps(file) if file.attribute(ROOT, "Type") in COLLECTIONS else VtkHdfSteps(file)
+        steps = options.keep("steps", lambda: _steps_of(file))
     return read_steps(steps, path, options)
+
+
+def _steps_of(file: HdfFile) -> VtkHdfSteps | BlockSteps:
+    return BlockSteps(file) if file.attribute(ROOT, "Type") in COLLECTIONS else VtkHdfSteps(file)
 
 
 class BlockSteps:

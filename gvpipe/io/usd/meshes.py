@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -145,8 +147,7 @@ def polygons_of(mesh: Any, times: Array, where: str, start: int = 0) -> tuple[In
     result = []
     for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()):
         first = _integers(attribute, float(times[0]))
-        samples = attribute.GetTimeSamples() if attribute.ValueMightBeTimeVarying() else []
-        for moment in (each for each in samples if times[0] < each <= times[-1] + 1e-6):
+        for moment in _moments(attribute, times):
             if not np.array_equal(_integers(attribute, moment), first):
                 number = start + first_frame_of(moment, times)
                 what = f"the topology of mesh {_path(mesh)} changes at frame {number} (time code {moment:g})"
@@ -155,7 +156,26 @@ def polygons_of(mesh: Any, times: Array, where: str, start: int = 0) -> tuple[In
     return result[0], result[1]
 
 
-def groups_of(mesh: Any, n_polygons: int, materials: Materials) -> tuple[Int64, tuple[int | None, ...]]:
+def changing_frames(mesh: Any, times: Array) -> Iterator[int]:
+    """The first frame, at ``times``, where corners per polygon differ, and the first where the vertices of corners do."""
+    for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()):
+        moments = _moments(attribute, times)
+        first = _integers(attribute, float(times[0])) if moments else None
+        for moment in moments:
+            if not np.array_equal(_integers(attribute, moment), first):
+                yield first_frame_of(moment, times)
+                break
+
+
+def _moments(attribute: Any, times: Array) -> list[float]:
+    """Times of samples behind the first frame."""
+    if not attribute.ValueMightBeTimeVarying():
+        return []
+    samples = attribute.GetTimeSamples()
+    return samples[bisect_right(samples, times[0]) : bisect_right(samples, times[-1] + 1e-6)]  # type: ignore[no-any-return]
+
+
+def groups_of(mesh: Any, n_polygons: int, materials: Materials, time: float) -> tuple[Int64, tuple[int | None, ...]]:
     """Return the group ``(P,)`` of each polygon and the material of each group: one per subset that binds materials.
 
     Polygons of no subset are group 0; those of several are of the first.
@@ -167,7 +187,7 @@ def groups_of(mesh: Any, n_polygons: int, materials: Materials) -> tuple[Int64, 
     for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
         if subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
             continue
-        indices = _integers(subset.GetIndicesAttr(), 0.0)
+        indices = _integers(subset.GetIndicesAttr(), time)
         indices = indices[(indices >= 0) & (indices < n_polygons)]
         groups[indices[groups[indices] == 0]] = len(bound)
         bound.append(materials.of(subset.GetPrim()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gvpipe.foundation.isolation.confinement import confine
+from gvpipe.foundation.isolation.confinement import confine_once
 from gvpipe.io.library.worker import bytes_below, limit_memory, limited_time
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene.worker import serve_scene
@@ -21,7 +21,7 @@ def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     os.environ.setdefault("PXR_WORK_THREAD_LIMIT", str(THREADS))
     import pxr.UsdSkel  # noqa: F401  libraries of code do not count
 
-    confine([os.path.dirname(os.path.realpath(path))])
+    confine_once(os.path.dirname(os.path.realpath(path)))
 
     if options.unlimited:
         return read_stage(path, options)
