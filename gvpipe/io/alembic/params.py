@@ -65,7 +65,7 @@ def layers_of(
             name = _numbered("uv", layers)
         layer = _layer(name, kind, param, polygons, time)
         if layer is None:
-            left.append(name)
+            left.extend([name] if len(_values(param, time)) else [])  # nothing: a shot of a capture lacks it
         elif layer.domain != "constant" or kind == "color":
             layers.append(layer)
     return tuple(layers), left
@@ -182,7 +182,7 @@ def _layer(name: str, kind: str, param: Any, polygons: SceneMesh, time: float) -
 
     value = param.getIndexedValue(Abc.ISampleSelector(time))
     values = as_numbers(value.getVals())
-    values = values.reshape(len(values), -1)
+    values = values.reshape(len(values), -1) if values.size else values
     if not values.size or (values.dtype.kind == "f" and not np.isfinite(values).all()):
         return None
     if values.dtype.kind == "f":
@@ -194,6 +194,12 @@ def _layer(name: str, kind: str, param: Any, polygons: SceneMesh, time: float) -
     rows = len(values) if indices is None else len(indices)
     sizes = {"vertex": polygons.n_vertices, "corner": len(polygons.corners), "polygon": len(polygons.counts), "constant": rows}
     return Layer(name, kind, domain, values, indices) if rows == sizes[domain] else None
+
+
+def _values(param: Any, time: float) -> Array:
+    from alembic3d import Abc
+
+    return as_numbers(param.getIndexedValue(Abc.ISampleSelector(time)).getVals())
 
 
 def _turned(normals: Layer, turn: Float64) -> Layer:

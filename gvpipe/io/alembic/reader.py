@@ -186,7 +186,8 @@ def _face_sets(schema: Any, n_polygons: int, time: float) -> tuple[Int64, list[s
         held = schema.getFaceSet(name)  # it must outlive its schema
         indices = as_integers(held.getSchema().getValue(Abc.ISampleSelector(time)).getFaces())
         indices = indices[(indices >= 0) & (indices < n_polygons)]
-        sets.append((indices, name))
+        if len(indices) or held.getSchema().isConstant():  # a set of other shots of a capture is empty
+            sets.append((indices, name))
     groups = np.zeros(n_polygons, np.int64)
     ordered = sorted(sets, key=lambda each: int(each[0].min(initial=n_polygons)))
     for number, (indices, _) in enumerate(ordered, start=1):

@@ -16,7 +16,7 @@ from gvpipe.io.scene.frames import first_frame_of
 from gvpipe.io.usd.instances import Instance, find_instances, is_hidden_below
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.motion import visibility_samples
-from gvpipe.io.usd.primvars import is_passed_over
+from gvpipe.io.usd.primvars import is_passed_over, varies_in
 
 HIDDEN_PURPOSES = ("guide", "proxy")
 TAKEN = {  # types of prims that are read, or that only hold others
@@ -57,7 +57,6 @@ def find_meshes(stage: Any) -> Found:
         sets = prim.GetVariantSets()
         several = [name for name in sets.GetNames() if len(sets.GetVariantSet(name).GetVariantNames()) > 1]
         left.add_all(f"other variants of set {name}" for name in several)
-        left.add_all(_animated_inputs(prim))
         custom = [str(each.GetName()) for each in prim.GetAuthoredAttributes() if each.IsCustom()]
         left.add_all(f"attribute {name}" for name in custom if name not in NAMES)
         if prim.IsA(UsdGeom.PointInstancer):
@@ -94,14 +93,14 @@ def find_meshes(stage: Any) -> Found:
     return Found(tuple(meshes), tuple(notes), left)
 
 
-def _animated_inputs(prim: Any) -> list[str]:
-    """What of a shader changes over time: materials stand still here."""
-    from pxr import UsdShade
+def animated_inputs(stage: Any, span: tuple[float, float] | None) -> Iterator[str]:
+    """What of shaders changes over time, or from a time to another: materials stand still here."""
+    from pxr import Usd, UsdShade
 
-    if not (prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph)):  # materials are node graphs
-        return []
-    inputs = UsdShade.ConnectableAPI(prim).GetInputs()
-    return [f"animation of {each.GetBaseName()}" for each in inputs if each.GetAttr().ValueMightBeTimeVarying()]
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph):  # materials are node graphs
+            inputs = UsdShade.ConnectableAPI(prim).GetInputs()
+            yield from (f"animation of {each.GetBaseName()}" for each in inputs if varies_in(each.GetAttr(), span))
 
 
 def _left_of(mesh: Any) -> list[str]:

@@ -130,14 +130,17 @@ def _varies(primvar: Any, time: float, last: float | None) -> bool:
     if not primvar.ValueMightBeTimeVarying() or last is None:
         return bool(primvar.ValueMightBeTimeVarying())
     parts = [primvar.GetAttr(), *([primvar.GetIndicesAttr()] if primvar.IsIndexed() else [])]
-    for part in parts:
-        samples = part.GetTimeSamples()
-        moments = samples[bisect_right(samples, time) : bisect_right(samples, last + 1e-6)]
-        if moments:
-            first = part.Get(time)
-            if any(part.Get(moment) != first for moment in moments):
-                return True
-    return False
+    return any(varies_in(part, (time, last)) for part in parts)
+
+
+def varies_in(attribute: Any, span: tuple[float, float] | None) -> bool:
+    """Whether an attribute may change over time; given a first and a last time, whether it does from the one to the other."""
+    if not attribute.ValueMightBeTimeVarying() or span is None:
+        return bool(attribute.ValueMightBeTimeVarying())
+    samples = attribute.GetTimeSamples()
+    moments = samples[bisect_right(samples, span[0]) : bisect_right(samples, span[1] + 1e-6)]
+    first = attribute.Get(span[0]) if moments else None
+    return any(attribute.Get(moment) != first for moment in moments)
 
 
 def _is_blocked(primvar: Any, time: float) -> bool:

@@ -19,7 +19,7 @@ from gvpipe.io.scene.layers import join_layers
 from gvpipe.io.scene.mesh import SceneMesh, join
 from gvpipe.io.usd.instances import InstanceMotion
 from gvpipe.io.usd.materials import Materials
-from gvpipe.io.usd.meshes import changing_frames, find_meshes, groups_of, polygons_of
+from gvpipe.io.usd.meshes import animated_inputs, changing_frames, find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
 from gvpipe.io.usd.names import name_of, parent_path
 from gvpipe.io.usd.primvars import animated_primvars, layers_of, sampled_of
@@ -50,7 +50,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     where = str(path)
     check_inside(stage, path)
     found = find_meshes(stage)
-    skins, materials = Skins(stage), Materials(stage, path)
+    skins = Skins(stage)
     places = UsdGeom.XformCache()
     start = float(stage.GetStartTimeCode())
 
@@ -79,6 +79,8 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     frames = SceneFrames(motions, times, where, "time code", first, [layer.realPath for layer in stage.GetUsedLayers()])
     frames.changes_at = None if changes_at is None else first + changes_at
     last = float(times[-1]) if options.memory else None
+    materials = Materials(path, None if last is None else float(times[0]))
+    found.left.add_all(animated_inputs(stage, None if last is None else (float(times[0]), last)))
     own = [found.meshes[number][0] for number in kept]
     read = [_read_mesh(mesh, motion, materials, (times, where, first), last) for mesh, motion in zip(own, motions, strict=True)]
     meshes = [mesh for mesh, _ in read]
