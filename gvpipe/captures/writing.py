@@ -29,7 +29,8 @@ def write_capture_files(capture: Capture, path: StrPath, start: int = 0, compres
     target = os.fspath(path)
     suffix = Path(target).suffix.lower()
     is_pattern = match_pattern(target) is not None or os.path.isdir(target) or target.endswith(("/", os.sep))
-    if suffix in CAPTURE_WRITERS and not is_pattern and compress == "none" and len(capture.shots) > 1:
+    is_whole = suffix in CAPTURE_WRITERS and not is_pattern and compress == "none" and len(capture.shots) > 1
+    if is_whole and (suffix != ".vtkhdf" or capture.shots[0].volume is None):
         return [target], list(CAPTURE_WRITERS[suffix](capture, Path(target)))
     spans = zip(capture.starts, capture.lengths, capture.shots, strict=True)
     runs = [Run(start + begin, start + begin + length, shot) for begin, length, shot in spans]

@@ -25,10 +25,15 @@ def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
 
     if options.unlimited:
         return read_stage(path, options)
+    with limited_time(options.keep("bytes", lambda: _limit(path))):
+        return read_stage(path, options)
+
+
+def _limit(path: Path) -> int:
+    """Limit the memory, and return the bytes that it follows from."""
     n_bytes = max(path.stat().st_size, bytes_below(path.absolute().parent, tuple(SIGNATURES)))
     limit_memory(n_bytes)
-    with limited_time(n_bytes):
-        return read_stage(path, options)
+    return n_bytes
 
 
 if __name__ == "__main__":
