@@ -13,6 +13,7 @@ CaptureWriter = Callable[[Any, Path], Any]
 """Writes a `gvpipe.model.capture.Capture` to a path; returns notes: what the format cannot hold."""
 
 CAPTURE_WRITERS: dict[str, CaptureWriter] = {
+    ".glb": late("gltf.capture_writer", "write_capture"),
     ".pvd": late("simulation.pvd_writer", "write_capture"),
     ".vtkhdf": late("simulation.vtkhdf_capture", "write_capture"),
     ".abc": late("alembic.capture_writer", "write_capture"),
