@@ -15,7 +15,17 @@ from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
 from gvpipe.io.formats import FRAME_FORMATS
 from gvpipe.io.options import ReadOptions, RunMemory
-from gvpipe.io.scene_formats import HAVE_CLIPS, IN_PROCESSES, MARKERS, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, scene_readers
+from gvpipe.io.scene_formats import (
+    GLTF,
+    HAVE_CLIPS,
+    IN_PROCESSES,
+    MARKERS,
+    OPENVAT,
+    POINT_CACHES,
+    SCENES,
+    SIMULATIONS,
+    scene_readers,
+)
 
 if TYPE_CHECKING:
     from gvpipe.model.sequence import MeshSequence
@@ -94,7 +104,8 @@ def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], optio
         with contextlib.nullcontext() if suffix in IN_PROCESSES else reading(Path(path), ""):
             sequence = reader(Path(path), options)
         if sequence is not None:
-            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, options.frames)
+            has_span = suffix in (*SIMULATIONS, *SCENES) or (suffix in GLTF and options.memory is not None)
+            return sequence if has_span else _span(sequence, options.frames)
     return _read_frames(path, options)
 
 

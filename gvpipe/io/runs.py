@@ -46,9 +46,7 @@ def find_runs(read: ReadFrames, frames: tuple[int, int | None] | None = None) ->
     return [run if run.sequence.fps == fps else replace(run, sequence=run.sequence.with_fps(fps)) for run in runs]
 
 
-def _read_run(
-    read: ReadFrames, span: tuple[int, int | None] | None, end: int | None
-) -> tuple[MeshSequence, int | None]:
+def _read_run(read: ReadFrames, span: tuple[int, int | None] | None, end: int | None) -> tuple[MeshSequence, int | None]:
     """The frames from the span's first to the next change or the end, and the one after the last."""
     start, stop = span or (0, end)
     while True:

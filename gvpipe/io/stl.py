@@ -45,7 +45,7 @@ class StlLoader:
         """Load one file.
 
         Raises:
-            TopologyChange: there are other triangles than in the first; or corners that were one vertex in the first file are apart in this one.
+            TopologyChange: there are other triangles than in the first file, or corners that were one vertex there are apart.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
         exact, solids, lost = _load_corners(path)

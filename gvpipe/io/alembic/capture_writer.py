@@ -1,6 +1,7 @@
 """A capture as an Alembic archive: polygon meshes of changing (heterogeneous) topology, a sample of everything per frame.
 
-What a shot does not have, be it a mesh, a parameter or a face set, is empty in its frames. The library stores equal samples once.
+What a shot does not have, be it a mesh, a parameter or a face set, is empty in its frames. The library
+stores equal samples once.
 """
 
 from __future__ import annotations
@@ -234,4 +235,3 @@ class ChangingMesh:
             held.held.getSchema().set(AbcGeom.OFaceSetSchemaSample(filled(imath.IntArray, np.zeros(0, np.int32))))
         held.n_frames = max(held.n_frames, self._shot_start)
         return held
-

@@ -1,7 +1,7 @@
 """A capture as one animated GLB: a scene for each shot, shown in its frames.
 
-glTF's own meshes keep their triangles. So each shot has a node of its own, above its meshes, whose scale is 1 in the shot's frames
-and 0 in all others, by keys that are held (STEP). Every player knows scales; KHR_node_visibility, with an animation by
+glTF's own meshes keep their triangles. So each shot has a node of its own, above its meshes, whose scale is 1 in the shot's
+frames and 0 in all others, by keys that are held (STEP). Every player knows scales; KHR_node_visibility, with an animation by
 KHR_animation_pointer, is known to few. Inside of a shot, morph targets move the meshes, as in the file of a sequence.
 """
 

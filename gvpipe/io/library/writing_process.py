@@ -62,6 +62,7 @@ def write_by(module: str, function: str, given: MeshSequence | Capture, path: Pa
 def _serve(process: Any, order: tuple[str, str, Path, Path], given: MeshSequence | Capture) -> tuple[str, Any]:
     """Answer what the process asks until it says how it ended."""
     module, function, temporary, path = order
+    head: Any
     if isinstance(given, MeshSequence):
         sequence, head = given, _without_frames(given)
     else:

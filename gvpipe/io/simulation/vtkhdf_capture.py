@@ -146,7 +146,7 @@ class CaptureWriter:
 
     def _write_numbers(self, group: str, domain: str, content: PolyContent, span: tuple[int, int, int]) -> None:
         """Write the numbers of a shot: of ``span``, its first step, how many there are, and the rows of each."""
-        before, n_frames, _ = span
+        n_frames = span[1]
         for name, values in content.still(domain).items():
             held = self._held(group, name, plain_columns(values), span, content.attributes[name].unit)
             if held is not None:

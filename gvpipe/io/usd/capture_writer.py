@@ -138,7 +138,8 @@ class JoinedStage:
             if not known:
                 Sdf.CopySpec(layer, path, self._layer, path)
             elif known.targetPathList.GetAppliedItems() != spec.targetPathList.GetAppliedItems():
-                self._notes.append(f"USD binds a material for all frames; those of {path.GetPrimPath().name} are the first shot's")
+                shown = path.GetPrimPath().name
+                self._notes.append(f"USD binds a material for all frames; that of {shown} is the first shot's")
             return
         if not known:
             Sdf.CopySpec(layer, path, self._layer, path)
@@ -198,4 +199,3 @@ def _nothing(name: str, value: Any) -> Any:
     from pxr import Sdf
 
     return type(value)() if name in EMPTIED else Sdf.ValueBlock()
-

@@ -159,7 +159,7 @@ def changing_frames(mesh: Any, times: Array) -> Iterator[int]:
     """The first frame, at ``times``, where corners per polygon differ, and the first where the vertices of corners do."""
     for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()):
         moments = _moments(attribute, times)
-        first = _integers(attribute, float(times[0])) if moments else None
+        first = _integers(attribute, float(times[0]))
         for moment in moments:
             if not np.array_equal(_integers(attribute, moment), first):
                 yield first_frame_of(moment, times)

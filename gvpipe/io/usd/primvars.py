@@ -35,7 +35,11 @@ def layers_of(
     from pxr import UsdGeom
 
     api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
-    primvars = {each.GetPrimvarName(): each for each in api.FindPrimvarsWithInheritance() if each.HasValue() and not _is_blocked(each, time)}
+    primvars = {
+        each.GetPrimvarName(): each
+        for each in api.FindPrimvarsWithInheritance()
+        if each.HasValue() and not _is_blocked(each, time)
+    }
     layers: list[Layer] = []
     left: list[str] = []
     normals = _normals(mesh, primvars.get("normals"), polygons, time, turn)

@@ -105,7 +105,7 @@ def _write_package(make: StageMaker, images: Mapping[str, Image], path: Path) ->
 
 
 def write_stage(
-    sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None, names: Sequence[str]
+    sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None, pictures: Sequence[str]
 ) -> tuple[str, ...]:
     """Write a stage alone; returns what the format cannot hold.
 
@@ -113,7 +113,7 @@ def write_stage(
         sequence, path, skin: as of `write_usd`.
         name: of a mesh without one.
         textures: the folder of the images, as the stage names it.
-        names: of the images' files.
+        pictures: names of the images' files.
     """
     from pxr import Gf, UsdGeom, UsdSkel
 
@@ -136,7 +136,7 @@ def write_stage(
     stage.SetDefaultPrim(top)
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
-    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, list(names))
+    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, list(pictures))
     normals = SceneNormals(sequence, "USD")
     attributes = {name: each for name, each in normals.attributes.items() if name not in normals.fields}
     names = primvar_names({**attributes, **normals.fields})
