@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from gvpipe.foundation.errors import TopologyChange
@@ -24,7 +24,8 @@ def find_runs(read: ReadFrames, frames: tuple[int, int | None] | None = None) ->
     """Return the runs of an input, in order.
 
     Most readers end a run where they meet a change, and say where it is: ``changes_at`` of the positions. Others may meet a
-    later change first, so a run of theirs is read again until nothing changes in it. All runs get the rate of the longest.
+    later change first, so a run of theirs is read again until nothing changes in it. Runs of one frame, which have no rate of
+    their own, get that of the longest.
 
     Args:
         read: reads some frames, None: all; it, or reading positions, may raise `TopologyChange`.
@@ -42,8 +43,19 @@ def find_runs(read: ReadFrames, frames: tuple[int, int | None] | None = None) ->
         begin = start if stop is None else stop - len(sequence)  # steps without cells may be left out at first
         runs.append(Run(begin, begin + len(sequence), sequence))
         start = begin + len(sequence)
+    longest = max(runs, key=lambda run: len(run.sequence)).sequence
+    return [run if len(run.sequence) > 1 else replace(run, sequence=run.sequence.with_fps(longest.fps)) for run in runs]
+
+
+def at_one_rate(runs: Sequence[Run]) -> list[MeshSequence]:
+    """The sequences of runs at the rate of the longest; those of another rate keep the times of their frames."""
     fps = max(runs, key=lambda run: len(run.sequence)).sequence.fps
-    return [run if run.sequence.fps == fps else replace(run, sequence=run.sequence.with_fps(fps)) for run in runs]
+    return [run.sequence if run.sequence.fps == fps else _timed(run.sequence, fps) for run in runs]
+
+
+def _timed(sequence: MeshSequence, fps: float) -> MeshSequence:
+    times = tuple(sequence.times.tolist())
+    return replace(sequence.with_fps(fps), metadata=replace(sequence.metadata, times=times))
 
 
 def _read_run(read: ReadFrames, span: tuple[int, int | None] | None, end: int | None) -> tuple[MeshSequence, int | None]:

@@ -136,6 +136,7 @@ def read_capture(
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
     """
+    from gvpipe.io.runs import at_one_rate
     from gvpipe.model.capture import Capture
 
     if is_video(path) and clip is None and mesh is None and warp is None:
@@ -147,7 +148,7 @@ def read_capture(
     how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
     runs = read_runs(path, fps, clip, mesh, frames, **how)
     name = path if isinstance(path, str | os.PathLike) else path[0]
-    return Capture([run.sequence for run in runs], os.fspath(name))
+    return Capture(at_one_rate(runs), os.fspath(name))
 
 
 def is_video(path: Source) -> TypeGuard[StrPath]:

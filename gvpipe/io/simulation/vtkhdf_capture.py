@@ -1,7 +1,7 @@
 """A capture as one temporal VTKHDF file of poly data: each shot is a part, with polygons and still numbers of its own.
 
-`PartOffsets` says which part a step shows, and offsets where its points, cells and numbers start. Points and fields of all frames
-stand one after the other. Every step of a VTKHDF file has the same arrays, so one that a shot lacks is 0 there.
+`PartOffsets` says which part a step shows, and offsets where its points, cells and numbers start. Points and fields of all
+frames stand one after the other. Every step of a VTKHDF file has the same arrays, so one that a shot lacks is 0 there.
 
 Source: Kitware, VTK file formats, "VTKHDF file format", version 2.3.
 """

@@ -18,6 +18,7 @@ from gvpipe.model.capture import Capture
 
 EMPTIED = ("points", "faceVertexCounts", "faceVertexIndices", "indices")  # of a mesh that a shot does not have
 SHADERS = ("Shader", "Material")  # keep a value beside their samples, for programs that do not know changing materials
+INDICES = ":indices"
 FORM = ("interpolation", "elementSize")  # of a primvar, which all samples share
 
 
@@ -105,6 +106,7 @@ class JoinedStage:
         self._tracks: dict[Any, Track] = {}
         self._spans: list[tuple[float, float]] = []
         self._notes: list[str] = []
+        self._refused: set[tuple[int, str]] = set()  # shots, and indices of what is left out in them
 
     def add(self, layer: Any, start: float, n_frames: int) -> None:
         """Take a shot, which starts at a time code."""
@@ -125,7 +127,7 @@ class JoinedStage:
 
         paths: list[Any] = []
         layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-        for path in sorted(paths, key=lambda each: (each.IsPropertyPath(), each.pathElementCount)):
+        for path in sorted(paths, key=lambda each: (each.IsPropertyPath(), each.pathElementCount, str(each))):
             visit(path)
 
     def _take(self, layer: Any, spec: Any, number: int) -> None:
@@ -133,6 +135,8 @@ class JoinedStage:
         from pxr import Sdf
 
         path = spec.path
+        if (number, str(path)) in self._refused:
+            return
         known = self._layer.GetPropertyAtPath(path)
         if not isinstance(spec, Sdf.AttributeSpec):
             if not known:
@@ -148,6 +152,7 @@ class JoinedStage:
                 self._layer.EraseTimeSample(path, time)
             known.ClearDefaultValue()
         elif known.typeName != spec.typeName or any(known.GetInfo(key) != spec.GetInfo(key) for key in FORM):
+            self._refused.add((number, f"{path}{INDICES}"))
             name = path.name.removeprefix("primvars:")
             self._notes.append(f"{name} is of another kind in some shots, which USD cannot change; there it was left out")
             return

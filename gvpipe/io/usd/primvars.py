@@ -197,7 +197,7 @@ def _layer(name: str, kind: str, primvar: Any, polygons: SceneMesh, time: float)
     if primvar.GetElementSize() > 1 and values.ndim == 1:
         values = values.reshape(-1, primvar.GetElementSize()) if len(values) % primvar.GetElementSize() == 0 else values
     values = values.reshape(1, -1) if not primvar.GetTypeName().isArray else values.reshape(len(values), -1)
-    indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
+    indices = primvar.GetIndicesAttr().Get(time) if primvar.IsIndexed() else None  # None where they are blocked
     own = None if indices is None else np.array(indices, np.int64)
     if own is not None and (own.min(initial=0) < 0 or own.max(initial=0) >= len(values)):
         return None
