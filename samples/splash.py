@@ -1,8 +1,8 @@
 """Two drops that meet, fly on as one, and part: a capture, whose vertices and triangles change from frame to frame.
 
-The surface is the smooth union of two balls (`implicit`), cut into triangles on a grid that flies with the drops (`polygonise`).
-So frames in which the drops keep their distance have the same triangles, and all others have their own. Run it to write
-``splash/splash_01.obj`` and so on; `gvpipe encode samples/splash splash.mp4` makes one file of all.
+The surface is the smooth union of two balls (`implicit`), cut into triangles on a grid that flies with the drops
+(`polygonise`). So frames in which the drops keep their distance have the same triangles, and all others have their own.
+Run it to write ``splash/splash_01.obj`` and so on; `gvpipe encode samples/splash splash.mp4` makes one file of all.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from changing import SIZES, SPANS, sheet
+from folders import ROOT
 
 import gvpipe
 from gvpipe.asset.attribute import Attribute
@@ -138,6 +141,23 @@ def test_shots_in_gltf_are_shown_by_their_scale(tmp_path: Path) -> None:
     assert found.lengths == (1, 1) and np.allclose(found.frame(1)[0], scene().frame(3)[0])
 
 
+def test_three_js_shows_one_shot_at_a_time(tmp_path: Path) -> None:
+    node, homes = shutil.which("node"), (ROOT / "gvpipe" / "web", ROOT / "tests" / "web" / "npm")
+    three = next((home / "node_modules" / "three" for home in homes if (home / "node_modules" / "three").exists()), None)
+    if node is None or three is None:
+        pytest.skip("Node or three.js is not there: cd gvpipe/web && npm ci")
+    given = scene()
+    gvpipe.write(given, tmp_path / "a.glb")
+    command = [node, str(ROOT / "tests" / "three_positions.mjs"), str(three), str(tmp_path / "a.glb"), "6", "25"]
+    found = np.frombuffer(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout).reshape(6, -1, 3)
+    ends = np.cumsum([0, *(shot.n_vertices for shot in given.shots)])
+    for frame in range(6):
+        shown, own = given.locate(frame)
+        for number, shot in enumerate(given.shots):
+            points = found[frame, ends[number] : ends[number + 1]]
+            assert np.allclose(points, shot[own]) if number == shown else not points.any()
+
+
 def test_what_an_attribute_cannot_change_is_said(tmp_path: Path) -> None:
     pytest.importorskip("pxr")
     first, second, _ = scene().shots
@@ -161,7 +181,12 @@ def test_one_pass_over_many_runs(tmp_path: Path, suffix: str, monkeypatch: pytes
     gvpipe.write(gvpipe.Capture(shots), path)
     asked: list[Any] = []
     read = reading.read
-    monkeypatch.setattr(reading, "read", lambda *given: asked.append(given[4]) or read(*given))
+
+    def noted(*given: Any) -> MeshSequence:
+        asked.append(given[4])
+        return read(*given)
+
+    monkeypatch.setattr(reading, "read", noted)
     found = gvpipe.read_capture(path.parent if suffix == ".obj" else path)
     assert found.lengths == (1,) * 12
     assert asked == [None, *((frame, None) for frame in range(1, 12))]
