@@ -21,7 +21,8 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """The names of ``make_samples.py``, whose modules are gone afterwards."""
     monkeypatch.syspath_prepend(str(SAMPLES))
     yield runpy.run_path(str(SAMPLES / "make_samples.py"))
-    for module in ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise", "splash"):
+    names = ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise", "voice", "splash")
+    for module in names:
         sys.modules.pop(module, None)
 
 
@@ -46,6 +47,12 @@ def test_the_splash_is_what_its_script_makes(script: dict[str, Any], tmp_path: P
     pieces = [components(adjacency(shot.faces, shot.n_vertices))[0] for shot in capture.shots]
     assert pieces == [2, 2, 2, 1, 1, 1, 2, 2]
     assert all(2 * len(unique_edges(shot.faces)) == 3 * len(shot.faces) for shot in capture.shots)
+
+
+def test_the_voice_is_what_the_script_makes(script: dict[str, Any], tmp_path: Path) -> None:
+    script["write_voice"](tmp_path / "voice.wav")
+    assert (tmp_path / "voice.wav").read_bytes() == (SAMPLES / "voice.wav").read_bytes()
+    assert (SAMPLES / "voice.wav").stat().st_size < 60_000
 
 
 @pytest.mark.parametrize("name", ["creature", pytest.param("cloth", marks=pytest.mark.slow)])

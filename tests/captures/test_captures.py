@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from changing import SIZES, SPANS, sheet, write_objs
 from file_server import serving
+from folders import SAMPLES
 
 import gvpipe
 from gvpipe.container.mp4 import read_index
@@ -179,9 +180,91 @@ def test_command_line(run: Run, tmp_path: Path) -> None:
     assert ended.status == 0 and (tmp_path / "c.pvd").is_file()
 
 
+def test_pictures(video: Path, tmp_path: Path) -> None:
+    """One camera for all shots, as for one mesh that has them all; a colour means the same in all."""
+    from PIL import Image
+
+    def painted(frame: int, **options: Any) -> Any:
+        gvpipe.render(sheets(), tmp_path / "a.png", frame=frame, size=96, **options)
+        return np.asarray(Image.open(tmp_path / "a.png").convert("RGB"), int)
+
+    with gvpipe.open_capture(video) as found:
+        gvpipe.render(found.capture(), tmp_path / "b.gif", size=96)
+    with Image.open(tmp_path / "b.gif") as film:
+        assert getattr(film, "n_frames", 0) == 6
+    spans = [np.ptp(np.argwhere(np.ptp(painted(frame, view="top"), axis=2) > 9), axis=0) for frame in (0, 4, 5)]
+    assert np.abs(np.diff(spans, axis=0)).max() <= 6  # the same sheet in other triangles, a little nearer each time
+    gvpipe.render(video, tmp_path / "c.png", frame=-1, size=64)
+    assert (tmp_path / "c.png").is_file()
+    with pytest.raises(InputError, match="frame 6 asked for"):
+        gvpipe.render(video, tmp_path / "d.png", frame=6)
+
+
+def test_colours_of_a_field_in_all_shots(tmp_path: Path) -> None:
+    shots = [
+        shot.reading_from(shot.positions, None, fields={"heat": np.full((len(shot), shot.n_vertices), float(number))})
+        for number, shot in enumerate(sheets().shots)
+    ]
+    from PIL import Image
+
+    pictures = []
+    for frame in (0, 3, 5):
+        gvpipe.render(gvpipe.Capture(shots), tmp_path / "a.gif", size=160, field="heat", view="front")
+        with Image.open(tmp_path / "a.gif") as film:
+            film.seek(frame)
+            pictures.append(np.asarray(film.convert("RGB"), int))
+    colours = [picture[80, 115] for picture in pictures]  # of the sheet's middle
+    assert len({tuple(colour) for colour in colours}) == 3
+
+
+def test_decode_and_restream(video: Path, tmp_path: Path) -> None:
+    assert gvpipe.decode(video, 3, 5).shape == (2, 49, 3) and gvpipe.decode(video, 4, 5)[0].shape == (49, 3)
+    with pytest.raises(SeveralShots):
+        gvpipe.decode(video)
+    with pytest.raises(InputError, match="needs no other layout"):
+        gvpipe.restream(video, tmp_path / "a.mp4")
+
+
 def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="leave out bare"):
         gvpipe.encode(sheets(), tmp_path / "a.mp4", bare=True)
     with pytest.raises(InputError, match=r"shot 0 \(frames 0 to 2\): "):
         gvpipe.encode(sheets(), tmp_path / "a.mp4", target_bpvf=0.001)
     assert not list(tmp_path.iterdir())
+
+
+def test_sound_of_the_whole_film(run: Run, video: Path, tmp_path: Path) -> None:
+    voice = str(SAMPLES / "voice.wav")
+    report = gvpipe.encode(sheets(), tmp_path / "a.mp4", audio=voice, audio_trim=True)
+    assert report.audio is not None and report.audio["seconds"] == pytest.approx(6 / 25, abs=0.03)
+    found = gvpipe.info(tmp_path / "a.mp4")
+    assert found.audio == report.audio and sum(found.sections.values()) == found.bytes
+    assert found.sections["sound"] == report.sections["sound"] > 0
+    with gvpipe.open_capture(tmp_path / "a.mp4") as opened:
+        assert opened.sound is not None and np.array_equal(opened[4], gvpipe.open_capture(video)[4]) is not None
+        later = opened.capture().part(3, 5).sound
+        assert later is not None and later.seconds == pytest.approx(2 / 25, abs=0.05)
+    ended = run("decode", tmp_path / "a.mp4", tmp_path / "out" / "%d.ply", "--json")
+    assert ended.status == 0 and Path(json.loads(ended.out)["audio"]["output"]).is_file()
+    ended = run("restream", video, tmp_path / "b.mp4", "--audio", voice)
+    assert ended.status == 0 and gvpipe.info(tmp_path / "b.mp4").audio is not None
+    assert np.array_equal(gvpipe.open_capture(tmp_path / "b.mp4")[4], gvpipe.open_capture(video)[4])
+    ended = run("restream", tmp_path / "b.mp4", tmp_path / "c.mp4", "--no-audio")
+    assert ended.status == 0 and (tmp_path / "c.mp4").read_bytes() == video.read_bytes()
+    data, index = (tmp_path / "a.mp4").read_bytes(), read_index(tmp_path / "a.mp4")
+    assert index is not None
+    (tmp_path / "d.mp4").write_bytes(data[:-9] + b"silenced!")
+    with gvpipe.open_capture(tmp_path / "d.mp4") as opened:  # the mesh stays as it is
+        assert opened[4].shape == (49, 3)
+    ended = run("decode", tmp_path / "d.mp4", tmp_path / "out" / "%d.ply")
+    assert ended.status == 0 and "sound is left out" in ended.err.replace("sound of the file", "sound")
+
+
+def test_among_many(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "many" / "sheets"
+    folder.mkdir(parents=True)
+    write_objs(folder)
+    ended = run("encode-all", tmp_path / "many", tmp_path / "out", "--json")
+    assert ended.status == 0 and json.loads(ended.out)["encoded"] == 1
+    ended = run("pack", tmp_path / "out", tmp_path / "s-%05d.tar")
+    assert ended.status == 1 and "a capture of 3 shots" in ended.err
