@@ -196,7 +196,10 @@ def read_runs(
     memory = RunMemory()
 
     def run(span: tuple[int, int | None] | None) -> MeshSequence:
-        return _read(path, fps, clip, mesh, span, unlimited, real_time, volume, memory)
+        sequence = _read(path, fps, clip, mesh, span, unlimited, real_time, bool(volume), memory)
+        if volume is None and has_inside(sequence):
+            sequence = _read(path, fps, clip, mesh, span, unlimited, real_time, True, memory)
+        return sequence
 
     runs = find_runs(run, frames)
     if warp is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
@@ -31,7 +32,9 @@ def read_frames(path: str | Sequence[str], options: ReadOptions) -> MeshSequence
     fps = options.fps
     first_file, stop = options.span(len(files), name)
     if options.volume and options.keep("suffixes", lambda: {file.suffix.lower() for file in files}) <= set(VOLUMES):
-        made: MeshSequence = late("simulation.step_lists", "read_volume_files")(files[first_file:stop], name, options, noticed)
+        if options.memory is None:
+            files, options = files[first_file:stop], replace(options, frames=None)
+        made: MeshSequence = late("simulation.step_lists", "read_volume_files")(files, name, options, noticed)
         return made
     frames = FrameFiles(files[first_file:stop], first_file, options.memory is not None)
     first = frames.first

@@ -53,14 +53,18 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
         if len(parts) > 1:
             return read_steps(options.keep("steps", lambda: _PartSteps(path, listed, parts)), path, options)
         start, stop = options.span(len(listed), str(path))
-        files = options.keep("files", lambda: _files(path, listed if options.memory else listed[start:stop]))
-        files = files[start:stop] if options.memory else files
+        whole = listed if options.memory else listed[start:stop]
+        every = options.keep("files", lambda: _files(path, whole))
+        files = every[start:stop] if options.memory else every
         listed = listed[start:stop]
         n_empty = _count_empty(files) if options.frames is None else 0
         files, listed, start = files[n_empty:], listed[n_empty:], start + n_empty
     times = np.array([time for time, _, _ in listed], np.float64)
+    if options.volume and options.memory is not None and len({file.suffix.lower() for file in every}) == 1:
+        moments = np.array([time for time, _, _ in whole], np.float64)
+        return read_steps(options.keep("volumes", lambda: FileSteps(every, moments)), path, options)
     if options.volume and len({file.suffix.lower() for file in files}) == 1:
-        steps = read_steps(FileSteps(files, times), path, replace(options, frames=None, memory=None))
+        steps = read_steps(FileSteps(files, times), path, replace(options, frames=None))
         return replace(steps, notes=(*empty_note(n_empty), *steps.notes))
     return read_listed(files, times, path, options, start, empty_note(n_empty))
 
@@ -74,8 +78,8 @@ def read_volume_files(files: list[Path], name: str, options: ReadOptions, notes:
         options: as of `read_steps`.
         notes: of whoever found them.
     """
-    times = file_times(files) if len(files) > 1 else None
-    sequence = read_steps(FileSteps(files, times), Path(name), options)
+    times = options.keep("moments", lambda: file_times(files)) if len(files) > 1 else None
+    sequence = read_steps(options.keep("volumes", lambda: FileSteps(files, times)), Path(name), options)
     left = tuple(each for each in sequence.not_carried if each not in TOLD)
     return replace(sequence, notes=(*notes, *sequence.notes), not_carried=left)
 
