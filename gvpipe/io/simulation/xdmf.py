@@ -55,7 +55,7 @@ def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: h5py is missing for HDF5, it is no such file, it is damaged, or a file that it names is missing.
     """
     with reading(path, "XDMF"):
-        steps = XdmfSteps(path)
+        steps = options.keep("steps", lambda: XdmfSteps(path))
     return read_steps(steps, path, options)
 
 
