@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.foundation.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report, Restreamed, compare, decode, encode, open, render, restream, skin
+    from gvpipe.api import Report, Restreamed, compare, decode, encode, open, open_capture, render, restream, skin
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -29,10 +29,12 @@ if TYPE_CHECKING:
     from gvpipe.grids.volume import Volume
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
     from gvpipe.metrics.comparison import Comparison
+    from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
     from gvpipe.notebook import show
-    from gvpipe.playback.files import read, write
+    from gvpipe.playback.capture_player import CapturePlayer
+    from gvpipe.playback.files import read, read_capture, write
     from gvpipe.playback.live import LiveEncoder, open_live
     from gvpipe.playback.player import Player
     from gvpipe.playback.video_info import Info, info
@@ -45,6 +47,8 @@ __all__ = [
     "Attribute",
     "BatchReport",
     "Camera",
+    "Capture",
+    "CapturePlayer",
     "Cells",
     "Comparison",
     "ExportReport",
@@ -75,8 +79,10 @@ __all__ = [
     "from_vtk",
     "info",
     "open",
+    "open_capture",
     "open_live",
     "read",
+    "read_capture",
     "record",
     "render",
     "restream",
@@ -86,7 +92,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Report", "Restreamed", "compare", "decode", "encode", "open", "render", "restream", "skin"),
+    "gvpipe.api": ("Report", "Restreamed", "compare", "decode", "encode", "open", "open_capture", "render", "restream", "skin"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
@@ -98,12 +104,14 @@ _HOMES = {
     "gvpipe.foundation.errors": ("GvpipeError",),
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
     "gvpipe.notebook": ("show",),
-    "gvpipe.playback.files": ("read", "write"),
+    "gvpipe.playback.capture_player": ("CapturePlayer",),
+    "gvpipe.playback.files": ("read", "read_capture", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
     "gvpipe.metrics.comparison": ("Comparison",),
     "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),
     "gvpipe.rasterizer.renderer": ("Renderer",),
+    "gvpipe.model.capture": ("Capture",),
     "gvpipe.model.sequence": ("MeshSequence",),
     "gvpipe.model.skin": ("Skin",),
     "gvpipe.recording": ("Recorder", "RigidParts", "record"),

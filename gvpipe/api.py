@@ -15,23 +15,26 @@ from typing import TYPE_CHECKING, Any
 
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
+from gvpipe.captures.encoding import CodedShot, write_capture
 from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
 from gvpipe.coding.segment_memory import fit_segments
 from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
-from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
+from gvpipe.container.mp4 import bytes_by_part, file_bytes, read_bytes, read_file, write_file
 from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
 from gvpipe.foundation import notes
 from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
-from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
+from gvpipe.foundation.errors import InputError, OverBudget, SettingError, SeveralShots, TopologyChange, in_file
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.model.warp import warped
-from gvpipe.playback.files import Source, frame_range, read
+from gvpipe.playback.capture_player import CapturePlayer
+from gvpipe.playback.files import Source, frame_range, read, read_capture
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
@@ -55,6 +58,7 @@ if TYPE_CHECKING:
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 LAYOUTS = ("stream", "bare")
+CAPTURE_CODEC = "pca"  # of shots, which are short: `mcgv` looks for motion that they do not have
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,8 @@ class Report:
         notes: what a user should know, a line each.
         errors: ``rmse``, ``rmse_diag``, ``max``, ``max_diag`` and ``kg`` of the file, as in `Comparison`, where a target was
             given or codecs competed; else empty.
+        shots: of a capture: ``start``, ``frames``, ``vertices``, ``triangles``, ``codec`` and ``bytes`` of each. Then
+            ``vertices`` and ``triangles`` are those of the largest, ``codec`` and ``settings`` those of the first.
     """
 
     codec: str
@@ -88,6 +94,7 @@ class Report:
     reason: str
     notes: list[str]
     errors: dict[str, float | None] = field(default_factory=dict)
+    shots: list[dict[str, Any]] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -132,7 +139,7 @@ class _StageClock:
 
 
 def encode(
-    source: MeshSequence | Source,
+    source: MeshSequence | Capture | Source,
     path: StrPath,
     codec: str | Codec | Sequence[Codec] | None = None,
     progress: Progress | None = None,
@@ -164,12 +171,16 @@ def encode(
 
     At most one target may be given. Then the quality is searched; see `gvpipe.rate_control.search`.
 
+    Where vertices or triangles change, the file is a capture: each run of frames that keeps them is a shot, coded as a sequence
+    is (`gvpipe.open_capture` reads it). Targets then hold in each shot; parts of the diagonal are of the capture's first frame.
+
     Args:
-        source: a sequence, or what `read` takes.
+        source: a sequence, a capture, or what `read` takes.
         path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
         codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all that serve the purpose
             with settings that all have: the one with the smallest file that meets the target, by default the KG error of their
-            quality (`gvpipe.coding.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
+            quality (`gvpipe.coding.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``, and ``"pca"``
+            for captures, whose shots are short.
         progress: called with a stage's name and the part of it that is done.
         fps: overrides the source's frames per second.
         target_rmse: largest root mean square error, as a part of frame 0's diagonal.
@@ -202,7 +213,8 @@ def encode(
 
     check_video_target(path, "gvpipe.encode's path")
     _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
-    given = _candidates(codec, settings, purpose)
+    request = _Request(codec, settings, purpose, (target_rmse, target_kg, target_bpvf, max_error))
+    given = request.candidates()
     is_shared = workers == AUTO_WORKERS and scheduler is None
     if workers == AUTO_WORKERS:
         workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
@@ -210,17 +222,28 @@ def encode(
         check_mapped(given)
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = _StageClock(progress)
+    layout = STREAM if stream else BARE if bare else PLAIN
     with open_executor(scheduler, workers) as executor:
-        options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited, "real_time": real_time, "warp": warp}
-        options["volume"] = volume
-        sequence = _open_source(source, path, fps, options)
-        if memory is not None:
-            given = fit_segments(given, sequence.n_vertices, memory)
-        target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
-        asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
-        with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
-            coded = _code(sequence, given, target, asset, bare, clock)
-    size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
+        options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
+        options |= {"real_time": real_time, "warp": warp, "volume": volume}
+        beside = AssetOptions.of(attributes, fields, textures)
+        if isinstance(source, Capture):
+            capture = _some_of(source, frames, fps)
+            return _encode_capture(capture, request, path, beside, memory, layout, clock)
+        try:
+            sequence = _open_source(source, path, fps, options)
+            if memory is not None:
+                given = fit_segments(given, sequence.n_vertices, memory)
+            target = _target(sequence, *request.targets)
+            asset = AssetCoder(sequence, beside)
+            with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
+                coded = _code(sequence, given, target, asset, bare, clock)
+        except TopologyChange:
+            if isinstance(source, MeshSequence):
+                raise
+            capture = read_capture(source, fps, **options)
+            return _encode_capture(capture, request, path, beside, memory, layout, clock)
+    size, bitstream = _write(sequence, coded, path, clock, layout)
     clock("", 1.0)
     return Report(
         codec=coded.codec.id,
@@ -241,6 +264,93 @@ def encode(
     )
 
 
+@dataclass(frozen=True)
+class _Request:
+    """What was asked for: a codec or some, their settings, a purpose, and the values of `TARGETS`."""
+
+    codec: str | Codec | Sequence[Codec] | None
+    settings: dict[str, Any]
+    purpose: str | None
+    targets: tuple[float | None, float | None, float | None, float | str | None]
+
+    def candidates(self, default: str | None = None) -> Codec | Sequence[Codec]:
+        """The settings object of the codec, or of all to choose from; ``default`` where neither codec nor purpose is given."""
+        codec = default if self.codec is None and self.purpose is None else self.codec
+        return _candidates(codec, self.settings, self.purpose)
+
+
+def _encode_capture(
+    capture: Capture,
+    request: _Request,
+    path: StrPath,
+    beside: AssetOptions,
+    memory: int | None,
+    layout: str,
+    clock: _StageClock,
+) -> Report:
+    """Encode each shot as a sequence."""
+    from gvpipe.asset_coding.encoder import AssetCoder
+
+    if layout == BARE:
+        raise SettingError(f"{capture.name}: vertices or triangles change; bare files keep them: leave out bare (--bare)")
+    diagonal = frame_diagonal(capture.shots[0])
+    given = request.candidates(CAPTURE_CODEC if _knows(CAPTURE_CODEC, request.settings) else None)
+    is_free = request.codec is None and request.purpose is None and "reorder" not in request.settings
+
+    def code(shot: MeshSequence, progress: Progress) -> CodedShot:
+        fitting = given if memory is None else fit_segments(given, shot.n_vertices, memory)
+        if is_free and len(shot) == 1 and isinstance(fitting, Codec):  # nobody knows its vertices from other frames
+            fitting = dataclasses.replace(fitting, reorder=True)
+        target = _shot_target(shot, request.targets, diagonal)
+        asset = AssetCoder(shot, beside)
+        coded = _code(shot, fitting, target, asset, True, progress)
+        x, y, z = shot.origin.tolist()
+        bitstream = dataclasses.replace(coded.encoded.bitstream, origin=(x, y, z), is_bare=True)
+        if coded.check is not None:
+            coded.check(read_bytes(file_bytes(bitstream), os.fspath(path)))
+        left_out = [*sorted(asset.plan.left_out), *shot.not_carried]
+        return CodedShot(bitstream, coded.codec, _notes(shot, target, asset.plan), left_out)
+
+    found = write_capture(capture, path, code, clock, layout == STREAM)
+    clock("", 1.0)
+    first, size, many = found.coded[0], found.written.size, len(capture.shots) > 1
+    return Report(
+        codec=first.codec.id,
+        settings=dataclasses.asdict(first.codec),
+        vertices=max(row["vertices"] for row in found.shots),
+        triangles=max(row["triangles"] for row in found.shots),
+        frames=len(capture),
+        fps=capture.fps,
+        bytes=size,
+        bpvf=8 * size / found.n_samples,
+        seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
+        not_carried=found.not_carried,
+        sections={**found.written.sections, "container": size - sum(found.written.sections.values())},
+        tried=[],
+        reason="",
+        notes=[notes.shots(capture.name, len(capture.shots), capture.starts[1]), *found.notes] if many else found.notes,
+        shots=found.shots,
+    )
+
+
+def _knows(codec: str, settings: Mapping[str, Any]) -> bool:
+    """Whether a codec has settings of these names."""
+    return settings.keys() <= {each.name for each in dataclasses.fields(codec_class(codec))}
+
+
+def _shot_target(
+    shot: MeshSequence, targets: tuple[float | None, float | None, float | None, float | str | None], diagonal: float
+) -> Target | None:
+    """The target of a shot; parts of a diagonal are of the capture's, model units."""
+    rmse, kg, bpvf, bound = targets
+    own = frame_diagonal(shot)
+    if rmse is not None and own > 0:
+        rmse *= diagonal / own
+    if bound is not None and read_bound(bound)[1] and own > 0:
+        bound = f"{read_bound(bound)[0] * diagonal / own!r}%"
+    return _target(shot, rmse, kg, bpvf, bound)
+
+
 KEYWORDS = tuple(name for name in signature(encode).parameters if name != "settings")
 """All of `encode` that is no setting of a codec."""
 
@@ -252,11 +362,12 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
 
     Raises:
         InputError: no such file, or the frames or the level are not in it.
+        SeveralShots: the frames are of several shots of a capture, which `open_capture` reads.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = Player(path, unlimited=unlimited)
+    player, shift = _player_of(path, start, stop, unlimited)
     first_kernels.expect(player.bitstream.codec)
-    start, stop = frame_range(player, start, stop)
+    start, stop = frame_range(player, start - shift, None if stop is None else stop - shift)
     if lod:
         whole = player.level(lod)
         positions = whole.read(start, stop)
@@ -264,6 +375,18 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
     return dataclasses.replace(whole, positions=positions, fields=fields)
+
+
+def _player_of(path: StrPath, start: int, stop: int | None, unlimited: bool) -> tuple[Player, int]:
+    """What has some frames, and the first one's number: a geometry video, or a shot of a capture."""
+    try:
+        return Player(path, unlimited=unlimited), 0
+    except SeveralShots:
+        video = CapturePlayer(path, unlimited=unlimited)
+        (number, _, _), *others = video.capture().spans(start, stop)
+        if others:
+            raise
+        return video.shot(number), video.starts[number]
 
 
 def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlimited: bool = False) -> Restreamed:
@@ -287,7 +410,10 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     if layout not in (None, PLAIN, STREAM):
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
     check_video_target(path, "gvpipe.restream's path")
-    bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    try:
+        bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    except SeveralShots as exc:
+        raise InputError(f"{source} is a capture, whose index comes first in any case; it needs no other layout") from exc
     chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
     if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
         bitstream = dataclasses.replace(bitstream, is_bare=False)
@@ -302,6 +428,11 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
 def open(path: StrPath, *, unlimited: bool = False, shared: Callable[[str], bytes] | None = None) -> Player:
     """Open a geometry video for random access; see `Player`; raises TypeError for what is no path."""
     return Player(path, unlimited=unlimited, shared=shared)
+
+
+def open_capture(path: StrPath, *, unlimited: bool = False) -> CapturePlayer:
+    """Open a geometry video of one shot or several, whose vertices and triangles may change; see `CapturePlayer`."""
+    return CapturePlayer(path, unlimited=unlimited)
 
 
 def compare(
@@ -396,7 +527,7 @@ def skin(
 
 
 def render(
-    source: MeshSequence | StrPath,
+    source: MeshSequence | Capture | StrPath,
     path: StrPath,
     *,
     frame: int | None = None,
@@ -428,7 +559,7 @@ def render(
     Materials, textures and vertex colours show if the sequence has them.
 
     Args:
-        source: a sequence, or what `gvpipe.read` takes.
+        source: a sequence, a capture, or what `gvpipe.read` takes; vertices and triangles may change.
         path: the file to write; an older one is replaced once the new one is complete.
         frame: the only frame to paint, of ``frames``, negative from the end; by default the first for a PNG, all for a film.
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
@@ -459,6 +590,7 @@ def render(
             part, a texture without its uv attribute.
         OutputError: the file cannot be written; no part of it is left.
     """
+    from gvpipe.rendering.capture_films import write_capture_pictures
     from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
 
     check_target(path)
@@ -487,12 +619,27 @@ def render(
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
-    if isinstance(source, MeshSequence):
-        sequence = source if frames is None else source.part(*frame_range(source, *frames))
-        sequence = sequence if fps is None else sequence.with_fps(fps)
-    else:
-        sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited, volume=cut is not None)
-    return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
+    if isinstance(source, Capture):
+        return list(write_capture_pictures(_some_of(source, frames, fps), target, options, progress))
+    reading: dict[str, Any] = {"unlimited": unlimited, "volume": cut is not None}
+    try:
+        if isinstance(source, MeshSequence):
+            sequence = source if frames is None else source.part(*frame_range(source, *frames))
+            sequence = sequence if fps is None else sequence.with_fps(fps)
+        else:
+            sequence = read(source, fps, clip, mesh, frames, **reading)
+        return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
+    except TopologyChange:
+        if isinstance(source, MeshSequence) or reference is not None:
+            raise
+    capture = read_capture(source, fps, clip, mesh, frames, **reading)
+    return list(write_capture_pictures(capture, target, options, progress))
+
+
+def _some_of(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:
+    """Some frames of a capture, at another rate."""
+    capture = capture if frames is None else capture.part(*frames)
+    return capture if fps is None else capture.with_fps(fps)
 
 
 def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywords: Any) -> dict[str, Any]:
@@ -584,9 +731,10 @@ def _segments_coded_by(
         yield
 
 
-def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Source) -> bool:
+def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Capture | Source) -> bool:
     """Whether workers may code segments: of a source that they can read, by a codec whose segments are independent."""
-    return isinstance(given, Codec) and given.maps_segments and not isinstance(source, MeshSequence) and count_cores() > 1
+    is_path = not isinstance(source, MeshSequence | Capture)
+    return isinstance(given, Codec) and given.maps_segments and is_path and count_cores() > 1
 
 
 def _absolute(source: Source) -> Source:
@@ -679,9 +827,9 @@ def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     return []
 
 
-def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
+def _is_among(path: StrPath, source: MeshSequence | Capture | Source) -> bool:
     """Whether the output is one of the inputs."""
-    if isinstance(source, MeshSequence) or not os.path.exists(path):
+    if isinstance(source, MeshSequence | Capture) or not os.path.exists(path):
         return False
     sources = [source] if isinstance(source, str | os.PathLike) else source
     return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)
