@@ -264,7 +264,15 @@ def test_the_picture_of_the_documentation(notebook: Any, folder: Path, request: 
     """A cell with the sample flag; ``--write-golden`` writes the picture that docs/notebooks.md shows."""
     shutil.copy(samples / "flag.npz", folder)
     _show(notebook, 'gvpipe.show("flag.npz", field="strain", colormap="viridis", autoplay=False)')
-    in_player(notebook, "await element.seek(20); element.closest('.jp-Cell').id = 'shown';")
+    notebook.set_window_size(1100, 1100)
+    in_player(
+        notebook,
+        """await element.seek(20);
+        const cell = element.closest(".jp-Cell");
+        cell.id = "shown";
+        cell.scrollIntoView();
+        await new Promise((resolve) => setTimeout(resolve, 500));""",
+    )
     shot = notebook.find_element("css selector", "#shown").screenshot_as_png
     picture = Image.open(io.BytesIO(shot)).convert("RGB")
     pixels = np.asarray(picture, int)
