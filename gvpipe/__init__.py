@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from gvpipe.grids.cells import Cells
     from gvpipe.grids.volume import Volume
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
+    from gvpipe.media.sound import Sound
+    from gvpipe.media.sound_files import read_sound
     from gvpipe.metrics.comparison import Comparison
     from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
@@ -68,6 +70,7 @@ __all__ = [
     "Restreamed",
     "RigidParts",
     "Skin",
+    "Sound",
     "Texture",
     "Volume",
     "compare",
@@ -83,6 +86,7 @@ __all__ = [
     "open_live",
     "read",
     "read_capture",
+    "read_sound",
     "record",
     "render",
     "restream",
@@ -107,6 +111,8 @@ _HOMES = {
     "gvpipe.playback.capture_player": ("CapturePlayer",),
     "gvpipe.playback.files": ("read", "read_capture", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
+    "gvpipe.media.sound": ("Sound",),
+    "gvpipe.media.sound_files": ("read_sound",),
     "gvpipe.metrics.comparison": ("Comparison",),
     "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),

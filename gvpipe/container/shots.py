@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.companion import Companion
 from gvpipe.container.mp4 import bytes_by_part, file_bytes
 from gvpipe.container.segments import SegmentParts
 from gvpipe.container.shared_sections import section_hash
-from gvpipe.container.shot_layout import ShotFile, pack_shots
+from gvpipe.container.shot_layout import ShotFile, ShotIndex, pack_shots
 from gvpipe.foundation.atomic import unnamed_path
 
 LEAST_SHARED = 64  # bytes of a section that is shared: its hash takes 35
@@ -32,6 +33,7 @@ def write_shots(
     shots: Sequence[Bitstream],
     fps: float,
     parts: Mapping[int, SegmentParts] | None = None,
+    companions: Sequence[Companion] = (),
 ) -> WrittenShots:
     """Write a capture, all of it or nothing.
 
@@ -41,6 +43,7 @@ def write_shots(
         shots: in order, of one rate.
         fps: the rate, frames per second.
         parts: of shots that are written in the stream layout, what each segment has; the others get the bare one.
+        companions: tracks beside the video, of the whole film.
 
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
@@ -60,11 +63,32 @@ def write_shots(
         bare = replace(shot, is_bare=True)
         data = file_bytes(shot, parts[number]) if number in parts else file_bytes(bare, shared=left_out)
         files.append(ShotFile(data, shot.n_frames, shot.n_vertices, shot.n_triangles))
+    for companion in companions:
+        sections[companion.kind] += companion.n_bytes
+    size = _write(path, pack_shots(poster, files, shared, fps, companions))
+    return WrittenShots(size, [len(file.data) for file in files], {name: number for name, number in sections.items() if number})
+
+
+def copy_shots(index: ShotIndex, path: str | os.PathLike[str], companions: Sequence[Companion]) -> int:
+    """Write a capture again, with other companions; return the file's bytes.
+
+    Raises:
+        OutputError: the file cannot be written; an older file of that name is left as it was.
+        FormatError: the capture is damaged.
+    """
+    poster = index.head + index.source.read(*index.poster)
+    columns = zip(index.frames, index.vertices, index.triangles, strict=True)
+    files = [ShotFile(index.source.read(index.offsets[k], index.n_bytes[k]), *counts) for k, counts in enumerate(columns)]
+    shared = {digest: index.find(digest) for digest in index.shared}
+    return _write(path, pack_shots(poster, files, shared, index.fps, companions))
+
+
+def _write(path: str | os.PathLike[str], parts: Iterable[bytes]) -> int:
     size = 0
     with unnamed_path(path) as temporary, open(temporary, "wb") as file:
-        for part in pack_shots(poster, files, shared, fps):
+        for part in parts:
             size += file.write(part)
-    return WrittenShots(size, [len(file.data) for file in files], {name: number for name, number in sections.items() if number})
+    return size
 
 
 def _hashes(shot: Bitstream) -> dict[str, str]:

@@ -95,6 +95,7 @@ def export_html(
     log: bool = False,
     speed: float = 1.0,
     warp: str | None = None,
+    clip: str | None = None,
     camera: str | tuple[float, float] | None = None,
     shading: str = "smooth",
     unlimited: bool = False,
@@ -116,6 +117,8 @@ def export_html(
         log: let colours follow the logarithm of the field; what is not above 0 is grey.
         speed: 0.0625 to 16; 1 is the video's own.
         warp: ``"NAME"`` or ``"NAME:SCALE"``: a field of vectors on vertices that moves them, so many times as far.
+        clip: a plane that cuts the mesh: ``"x=0.3"`` (model units), ``"y=30%"`` (of the first frame's box), ``"-x=0.3"``
+            (what lies below is left out). The section of a volume is filled.
         camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
         shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
@@ -149,9 +152,11 @@ def export_html(
         log=log,
         speed=speed,
         warp=warp,
+        clip=clip,
         camera=camera,
         shading=shading,
     )
+    view = replace(view, muted=any(each.sound is not None for each in (player, *pieces)))
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
         report = _write_page(player.path, _as_it_is(player), target, up, view, [_as_it_is(piece) for piece in pieces])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import json
 from importlib.util import find_spec
 from pathlib import Path
@@ -41,11 +42,11 @@ def test_no_outputs_are_kept(path: Path) -> None:
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_they_run(path: Path) -> None:
     """Every player that a cell gives is a widget, above what a saved notebook keeps."""
-    import nbformat
-    from nbclient import NotebookClient
-
-    notebook = nbformat.read(path, 4)  # type: ignore[no-untyped-call]
-    NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(path.parent)}}).execute()
+    nbformat, nbclient = (importlib.import_module(name) for name in ("nbformat", "nbclient"))
+    notebook = nbformat.read(path, 4)
+    nbclient.NotebookClient(
+        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(path.parent)}}
+    ).execute()
     outputs = [output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", [])]
     widgets = [each for each in outputs if "application/vnd.jupyter.widget-view+json" in each]
     kept = [each for each in outputs if "data-gvpipe" in each.get("text/html", "")]

@@ -18,6 +18,7 @@ const FIRST = 1 << 16; // bytes of the first request
 const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas|clip)\.(\d+)$/;
 const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
+const OF_COMPANIONS = /^companion\./; // which the browser fetches
 const PARTIAL = 206;
 const UNSATISFIABLE = 416;
 const FIRST_LIVE = 1 << 17; // bytes of the second request, of a file that is still written
@@ -198,7 +199,7 @@ export class StreamFile {
       const number = OF_SEGMENTS.exec(name)?.[2];
       if (number) this.segments.set(number, [...(this.segments.get(number) ?? []), name]);
     }
-    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name) && !OF_FIELDS.test(name));
+    const shared = entries.filter(({ name }) => ![OF_SEGMENTS, OF_FIELDS, OF_COMPANIONS].some((kind) => kind.test(name)));
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);

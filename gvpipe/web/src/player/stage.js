@@ -20,6 +20,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
 import { GeometryVideoMesh } from "../three/geometry_video_mesh.js";
+import { CutHandle } from "./cut_handle.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const FAR = 100; // balls that the motion fits in, at least
@@ -41,6 +42,7 @@ export class Stage {
     this.hasGpu = probeGpu();
     // without a GPU smooth edges would cost more than all else together
     this.renderer = new WebGLRenderer({ canvas, antialias: this.hasGpu, alpha: true });
+    this.renderer.localClippingEnabled = true;
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, FAR);
     this.scene.add(this.camera);
@@ -48,6 +50,9 @@ export class Stage {
     key.position.set(-1.2, 1.6, 1); // light goes with the camera, so that nothing looked at is dark
     this.camera.add(key, key.target);
     this.scene.add(new HemisphereLight(0xffffff, 0x8c8a88, 1.4));
+    this.handle = new CutHandle(canvas, this.camera, (place) => this.cutMoved(this.#modelPlace(place))); // hears of pointers first
+    this.scene.add(this.handle);
+    this.cutMoved = () => {}; // called with where the cut is dragged to, model units
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => {
       this.requestRender();
@@ -145,6 +150,37 @@ export class Stage {
     if ((await mesh.setWarp(name, scale)) && mesh === this.mesh) this.#frameShown();
   }
 
+  /** Cut by a plane (`GeometryVideoMesh.setClip`). */
+  async setClip(cut) {
+    const { mesh } = this;
+    const cutting = mesh.setClip(cut);
+    this.#showHandle();
+    try {
+      return await cutting;
+    } finally {
+      if (mesh === this.mesh) this.requestRender();
+    }
+  }
+
+  /** `{axis, low, high, place}`: where a cut can be along its axis, and where it is, model units; null if there is none. */
+  get cutRange() {
+    const { cut } = this.mesh;
+    if (!cut) return null;
+    const { min, max } = this.#motion();
+    const [low, high, place] = [min.getComponent(cut.axis), max.getComponent(cut.axis), cut.place].map((value) => this.#modelPlace(value, cut.axis));
+    return { axis: cut.axis, low, high, place };
+  }
+
+  /** A place along an axis in model units, of one in the scene. */
+  #modelPlace(place, axis = this.mesh.cut.axis) {
+    return place / this.scale + this.centre[axis] + this.mesh.video.origin[axis];
+  }
+
+  #showHandle() {
+    this.handle.show(this.mesh.cut, this.#motion());
+    this.requestRender();
+  }
+
   /** What is seen at a point of the picture (`GeometryVideoMesh.pick`). @param {number} x @param {number} y CSS pixels, from its upper left */
   pick(x, y) {
     const { camera } = this;
@@ -227,8 +263,10 @@ export class Stage {
   /** The picture drawn anew, without a mark, as a promise of a PNG file. */
   still() {
     this.mark.visible = false;
+    this.handle.isDrawn = false;
     this.renderer.render(this.scene, this.camera); // what was drawn before is gone once it is on the screen
     const picture = new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+    this.handle.isDrawn = true;
     this.setMark(this.marked);
     return picture;
   }
@@ -240,6 +278,7 @@ export class Stage {
     }
     this.mesh = this.marked = null;
     this.mark.visible = false;
+    this.handle.show(null);
     this.isFramed = false;
     this.requestRender();
   }
@@ -250,6 +289,7 @@ export class Stage {
     cancelAnimationFrame(this.pending);
     this.observer.disconnect();
     this.controls.dispose();
+    this.handle.dispose();
     this.reflected?.dispose();
     this.mark.geometry.dispose();
     this.mark.material.dispose();
@@ -311,6 +351,7 @@ export class Stage {
   }
 
   #frameShown() {
+    if (this.mesh.cut) this.#showHandle(); // the box may have grown
     if (this.isFollowing) this.#follow(this.#findMiddle());
     else if (this.isFramed && !this.box.containsBox(this.#motion())) this.resetView(); // the motion goes farther than was known
     this.setMark(this.marked);
