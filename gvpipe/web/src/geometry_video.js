@@ -27,6 +27,7 @@ const LATEST = 1000; // while clips come
 const IDLE = 5000; // while none does
 const TRIES = 5; // of a look that the server refuses
 const PATIENCE = 30_000; // ms, with an outage
+const SOUND_IN_PARTS = "its sound is left out, since the file comes in parts from no address; load the whole file to hear it";
 const DAMAGED_SOUND = "its sound is damaged, and is left out; get the file again from its source";
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
@@ -344,6 +345,10 @@ export class GeometryVideo {
     const data = file && soundOf(file, header);
     if (file && !data) {
       this.#soundNotes = [DAMAGED_SOUND];
+      return;
+    }
+    if (!file && isRangeSource(source)) {
+      this.#soundNotes = [SOUND_IN_PARTS];
       return;
     }
     let url = file ? null : String(addressOf(source));
