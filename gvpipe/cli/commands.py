@@ -121,8 +121,8 @@ def encode(
     read, too (s3://bucket/walk.npz). OUTPUT - is standard output.
     """
     from gvpipe import api
+    from gvpipe.captures.splitting import with_sounds, write_runs
     from gvpipe.cli.process import give_back_memory
-    from gvpipe.cli.splitting import with_sounds, write_runs
     from gvpipe.playback import files
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -144,7 +144,8 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         if split:
-            runs = files.read_runs(source, **asked.reading, unlimited=asked.unlimited)
+            reading = {**asked.reading, "volume": bool(asked.reading["volume"])}
+            runs = files.read_runs(source, **reading, unlimited=asked.unlimited)
             runs = with_sounds(runs, sound, asked.reading["frames"])
             written = write_runs(
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
@@ -201,7 +202,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
         out.text(f"  {codec_name} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
     if report.reason:
         out.text(report.reason)
-    _print_sections(out, report.sections, report.vertices * report.frames)
+    _print_sections(out, report.sections, round(8 * report.bytes / report.bpvf))
 
 
 @cli.command()
@@ -243,6 +244,7 @@ def decode(
     """
     from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
+    from gvpipe.cli.captures import write_shots
     from gvpipe.cli.choices import chosen, chosen_frames
     from gvpipe.cli.skeletons import check_glb_options, skin_of_video
     from gvpipe.foundation import notes
@@ -257,14 +259,21 @@ def decode(
         check_sound_target(sound_target)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        player = api.open(given, unlimited=unlimited)
-        start, stop = files.frame_range(player, first, last)
+        video = api.open_capture(given, unlimited=unlimited)
+        (number, begin, end), *others = video.capture().spans(first, last)
+        if others:
+            asked = {"parts": parts, "compress": compress, "fps": fps, "lod": lod, "local": local, "skin": skin}
+            beside = (sound_target, audio_out)
+            write_shots(video.capture().part(first, last), source, target, path, first, asked, progress, out, beside)
+            return
+        player = video.shot(number)
+        start, stop = video.starts[number] + begin, video.starts[number] + end
         level = player.level(lod)
-        sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
-        found, said = skin_of_video(player, path, (start, stop), skin, is_whole=not parts and not lod)
+        sequence = chosen(level.part(begin, end), parts, fps, "decode", progress)
+        found, said = skin_of_video(player, path, (begin, end), skin, is_whole=not parts and not lod)
         silent = sequence.with_sound(None)
         noticed = [*said, *files.write(silent.local() if local else silent, path, start, found, compress)]
-        sound, heard = write_beside(sequence, sound_target, audio_out)
+        sound, heard = write_beside(sequence.sound, sound_target, audio_out)
     noticed += heard + [note for note in player.bitstream.lost if note not in noticed]
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
@@ -400,7 +409,7 @@ def info(
 
     Of shards (shard.tar, 'shard-*.tar') it sums up the sequences, and checks each.
     """
-    from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines, shot_line
     from gvpipe.cli.choices import parse_frames
     from gvpipe.playback import video_info
 
@@ -432,7 +441,9 @@ def info(
     for note in found.notes:
         out.note(note)
     out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
-    _print_sections(out, found.sections, found.vertices * found.frames)
+    for row in found.shots:
+        out.text(shot_line(row))
+    _print_sections(out, found.sections, round(8 * found.bytes / found.bpvf))
 
 
 def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -> None:
