@@ -89,6 +89,17 @@ export function findIndex(start) {
   return null;
 }
 
+/** Where the head of the box behind `ftyp` and `moov` ends, of a file of which the start is here; 0 if it does not begin with these. */
+export function endOfHead(start) {
+  const view = new DataView(start.buffer, start.byteOffset, start.byteLength);
+  let position = 0;
+  for (const wanted of ["ftyp", "moov"]) {
+    if (position + 8 > start.length || String.fromCharCode(...start.subarray(position + 4, position + 8)) !== wanted) return 0;
+    position += view.getUint32(position);
+  }
+  return position + 8 + INDEX_UUID.length;
+}
+
 /** The error for a container that is not read here. */
 export function newerContainer(version) {
   return new GeometryVideoError(

@@ -5,7 +5,8 @@
 
 import { readFragmentSamples } from "../fragments.js";
 import { readDescription, ranks } from "../track.js";
-import { findIndex, readTag } from "./boxes.js";
+import { STREAM_LAYOUT_MAX_INDEX as MAX_INDEX } from "../constants.js";
+import { endOfHead, findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
@@ -41,14 +42,18 @@ export class StreamFile {
       throw asked.refused();
     }
     const incoming = response.status === PARTIAL ? null : new Incoming(asked);
-    const start = incoming ? await incoming.read(0, FIRST) : await asked.bytes();
+    let start = incoming ? await incoming.read(0, FIRST) : await asked.bytes();
     if (start.length < FIRST) return start;
     const rest = (data) => incoming?.whole() ?? fetchRest(url, signal, data);
+    const file = new StreamFile(url, signal, start.length, incoming);
+    file.total = totalOf(response);
+    const head = endOfHead(start);
+    if (head > start.length && head <= MAX_INDEX && head <= Number(file.total || Infinity)) { // a long sound has long tables
+      start = incoming ? await incoming.read(0, head) : joined([start, await file.#fetch(start.length, head - start.length)]);
+    }
     const box = findIndex(start);
     if (!box) return rest(start);
     if (box.isRoom) return StreamFile.#openLive(url, signal, start.length, box.end, incoming);
-    const file = new StreamFile(url, signal, start.length, incoming);
-    file.total = totalOf(response);
     const more = Math.max(0, box.end - start.length);
     const data = more ? joined([start, await file.#fetch(start.length, more)]) : start;
     return (await file.#begin(data, box)) ? file : rest(data);
