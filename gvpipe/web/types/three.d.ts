@@ -106,6 +106,9 @@ export class GeometryVideoMesh extends MeshOfVideo {
   setClip(cut: Cut | null): Promise<boolean>;
   /** (n, 3, 3) corners of the triangles of that section, model units, the file's origin apart; empty where the cut is hollow. */
   readonly section: Float32Array;
+  /** Where the plane of the cut is, in the geometry's units: across axis 0, 1 or 2; `sign` 1 leaves out what lies above. Or null. */
+  readonly cut: { axis: number; place: number; sign: number } | null;
+  updateMatrixWorld(force?: boolean): void;
   /** The box that the motion stays in, displacements with it, model units. It may grow. */
   readonly bounds: { min: [number, number, number]; max: [number, number, number] };
   /** What of the frame shown a ray meets first, hidden parts apart, in the geometry's units; of a triangle, its nearest vertex. */
