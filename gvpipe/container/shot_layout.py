@@ -7,7 +7,7 @@ shots have in common, such as pictures of textures, are stored once (`gvpipe.con
     file  = ftyp, moov (without pictures), index, shared sections, poster, shots
     index = "uuid" box SHOTS_UUID: magic, [u16] version, [varint] bytes of the header, header, [u32] CRC-32 of all before
     header = a JSON object in UTF-8, deflated (zlib): "fps", "id", "head": bytes and CRC-32 of ftyp and moov, "poster": bytes,
-             "shots": "frames", "vertices", "triangles" and "bytes" of each, "shared": bytes by hash, in order
+             "shots": "frames", "vertices", "triangles" and "bytes" of each, "shared": bytes by hash, in order, "box": see `ShotIndex`
     the shared sections lie in one "uuid" box DATA_UUID, if there are any; each shot in a "uuid" box SHOT_UUID
     id    = first 16 bytes, in hex, of the SHA-256 over the shared sections and the shots' files in order
 
@@ -53,6 +53,8 @@ MAX_HEADER = 1 << 22  # bytes, inflated
 MAX_BYTES = 1 << 40  # of a shot
 MAX_POSTER = 1 << 32
 MAX_CRC = (1 << 32) - 1
+BOX = "box"
+FARTHEST = 1e39  # of a corner of the box, model units
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ class ShotIndex:
         shared: offset and bytes of shared sections, by hash.
         head: bytes of ``ftyp`` and ``moov``.
         poster: offset and bytes.
+        box: smallest and largest x, y and z of the shots' first frames, before coding, model units, relative to the origin of the
+            first shot, so that a player has a view before it has decoded them; None: not known.
     """
 
     source: Source
@@ -89,6 +93,7 @@ class ShotIndex:
     shared: Mapping[str, tuple[int, int]]
     head: bytes
     poster: tuple[int, int]
+    box: tuple[float, ...] | None = None
 
     @property
     def size(self) -> int:
@@ -104,7 +109,13 @@ class ShotIndex:
         return self.source.read(*self.shared[digest])
 
 
-def pack_shots(poster: bytes, shots: Sequence[ShotFile], shared: Mapping[str, bytes], fps: float) -> Iterator[bytes]:
+def pack_shots(
+    poster: bytes,
+    shots: Sequence[ShotFile],
+    shared: Mapping[str, bytes],
+    fps: float,
+    box: Sequence[float] | None = None,
+) -> Iterator[bytes]:
     """Yield the bytes of a file, in order.
 
     Args:
@@ -112,6 +123,7 @@ def pack_shots(poster: bytes, shots: Sequence[ShotFile], shared: Mapping[str, by
         shots: in order.
         shared: sections that the shots leave out, by hash.
         fps: frames per second.
+        box: as of `ShotIndex`.
     """
     content = hashlib.sha256()
     for data in (*shared.values(), *(shot.data for shot in shots)):
@@ -132,6 +144,7 @@ def pack_shots(poster: bytes, shots: Sequence[ShotFile], shared: Mapping[str, by
             "bytes": [len(shot.data) for shot in shots],
         },
         "shared": {digest: len(data) for digest, data in shared.items()},
+        **({} if box is None else {BOX: list(box)}),
     }
     packed = zlib.compress(json.dumps(header, separators=(",", ":"), allow_nan=False).encode(), 9)
     index = MAGIC + VERSION.to_bytes(2, "little") + pack_block(packed)
@@ -210,7 +223,10 @@ def read_shots(source: Source, box: Box, budget: Budget = UNLIMITED) -> ShotInde
     check_no_samples(moov)
     if f"{TAG_PREFIX}{VERSION} {header.text('id')}".encode("utf-8", "replace") not in moov:
         raise corrupt("its shots belong to another file")
-    return ShotIndex(source, fps, frames, vertices, triangles, n_bytes, offsets, places, head, (poster_at, poster))
+    corners = header.numbers(BOX, 6, -FARTHEST, FARTHEST) if BOX in header else None
+    if corners is not None and any(low > high for low, high in zip(corners[:3], corners[3:], strict=True)):
+        raise header.wrong(BOX, "smallest before largest corners")
+    return ShotIndex(source, fps, frames, vertices, triangles, n_bytes, offsets, places, head, (poster_at, poster), corners)
 
 
 def _content(source: Source, at: int, uuid: UUID, length: int) -> int:

@@ -62,10 +62,22 @@ def write_shots(
         files.append(ShotFile(data, shot.n_frames, shot.n_vertices, shot.n_triangles))
     size = 0
     with unnamed_path(path) as temporary, open(temporary, "wb") as file:
-        for part in pack_shots(poster, files, shared, fps):
+        for part in pack_shots(poster, files, shared, fps, _box(shots)):
             size += file.write(part)
     return WrittenShots(size, [len(file.data) for file in files], {name: number for name, number in sections.items() if number})
 
 
 def _hashes(shot: Bitstream) -> dict[str, str]:
     return {name: section_hash(data) for name, data in shot.sections.items() if len(data) >= LEAST_SHARED}
+
+
+def _box(shots: Sequence[Bitstream]) -> list[float] | None:
+    """Smallest and largest corner of the shots' first frames, relative to the first's origin; None if a shot has no outline."""
+    first, corners = shots[0].origin, []
+    for shot in shots:
+        if shot.outline is None:
+            return None
+        shift = [own - other for own, other in zip(shot.origin, first, strict=True)] * 2
+        corners.append([float(value + by) for value, by in zip(shot.outline.box, shift, strict=True)])
+    low, high = (list(map(choose, zip(*corners, strict=True))) for choose in (min, max))
+    return low[:3] + high[3:]

@@ -1,7 +1,6 @@
 /** The payload: named sections with checksums, and a JSON header. Mirrors `gvpipe.container.bitstream`; `docs/format.md`, section 2. */
 
 import {
-  BARE_MAGIC,
   BITSTREAM_MAGIC as MAGIC,
   BITSTREAM_MAX_FRAMES as MAX_FRAMES,
   BITSTREAM_MAX_HEADER as MAX_HEADER,
@@ -9,6 +8,7 @@ import {
   BITSTREAM_MAX_SECTIONS as MAX_SECTIONS,
   BITSTREAM_MAX_VERTICES as MAX_VERTICES,
 } from "../constants.js";
+import { isBare, readBare } from "./bare.js";
 import { Budget } from "./budget.js";
 import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
@@ -17,6 +17,7 @@ import { AGAIN, GeometryVideoError, corrupt, quote } from "./errors.js";
 import { inflate } from "./inflate.js";
 
 const WITH_PICTURES = "mcgv";
+const UNLIKE = "it is not as gvpipe writes it";
 const LIMITS = { version: [1, 1 << 16], frames: [1, MAX_FRAMES], vertices: [1, MAX_VERTICES], triangles: [0, 1 << 29] };
 
 /** A geometry video's header and sections, and what reading them may cost. */
@@ -39,8 +40,13 @@ export class Payload {
   }
 }
 
-/** @param {import("./boxes.js").Container} container @returns {Promise<Payload>} */
-export async function readPayload(container) {
+/**
+ * @param {import("./boxes.js").Container} container
+ * @param {((hash: string) => Promise<Uint8Array|null>)|null} [find] gives sections that a shot shares with others; null: it is none
+ * @returns {Promise<Payload>}
+ */
+export async function readPayload(container, find = null) {
+  if (container.payload && isBare(container.payload)) return readBarePayload(container, find);
   const sections = container.sections ?? readPayloadSections(container.payload);
   const header = await readHeader(sections);
   if (container.frames) setFrames(header, container.frames);
@@ -50,11 +56,25 @@ export async function readPayload(container) {
     throw new GeometryVideoError("corrupt", `its geometry belongs to another file; ${AGAIN}`);
   }
   if (checksum !== (container.videoChecksum ?? checksum)) { // a file in parts has checksums of its own for its fragments
-    throw new GeometryVideoError("corrupt", `its video is damaged, or was re-encoded; ${AGAIN}`);
+    throw otherVideo();
   }
   const budget = new Budget(container.bytes);
   budget.keepMesh(header);
   return new Payload(header, sections, budget, container.late);
+}
+
+async function readBarePayload({ payload, bytes, videoChecksum }, find) {
+  if (!find) throw new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
+  const { header, sections, sharedBytes } = await readBare(payload, find);
+  const { video_crc32: checksum = 0 } = header.container; // of no pictures
+  if (checksum !== videoChecksum) throw otherVideo();
+  const budget = new Budget(bytes + sharedBytes);
+  budget.keepMesh(header);
+  return new Payload(header, sections, budget);
+}
+
+function otherVideo() {
+  return new GeometryVideoError("corrupt", `its video is damaged, or was re-encoded; ${AGAIN}`);
 }
 
 function readPayloadSections(payload) {
@@ -64,9 +84,6 @@ function readPayloadSections(payload) {
 
 function readTable(cursor) {
   const start = cursor.take(Math.min(cursor.left, MAGIC.length));
-  if (BARE_MAGIC.every((byte, i) => start[i] === byte)) {
-    throw new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
-  }
   if (!MAGIC.every((byte, i) => start[i] === byte)) {
     throw new GeometryVideoError("corrupt", `the payload does not start with gvpipe's magic; ${AGAIN}`);
   }
@@ -116,7 +133,14 @@ export function clipName({ container }, number) {
 export async function readHeader(sections) {
   const wrong = (what) => corrupt("header", what);
   if (!sections.has("header")) throw wrong("it is missing");
-  const text = await inflate(sections.get("header"), MAX_HEADER, wrong);
+  const header = checkHeader(await inflate(sections.get("header"), MAX_HEADER, wrong));
+  if (!header.container) throw wrong(UNLIKE);
+  return header;
+}
+
+/** The header. @param {Uint8Array} text @throws {GeometryVideoError} it is not as gvpipe writes it; that of the bare layout has no id */
+export function checkHeader(text) {
+  const wrong = (what) => corrupt("header", what);
   let header;
   try {
     header = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(text));
@@ -125,9 +149,7 @@ export async function readHeader(sections) {
   }
   for (const [key, [low, high]] of Object.entries(LIMITS)) checkInteger(header ?? {}, key, low, high);
   checkNumber(header, "fps", Number.MIN_VALUE, 100_000);
-  if (typeof header.codec !== "string" || !isObject(header.settings) || !isObject(header.container)) {
-    throw wrong("it is not as gvpipe writes it");
-  }
+  if (typeof header.codec !== "string" || !isObject(header.settings) || !isObject(header.container ?? {})) throw wrong(UNLIKE);
   return header;
 }
 
@@ -148,6 +170,7 @@ export function checkInteger(object, key, low, high) {
   return object[key];
 }
 
-function isObject(value) {
+/** Whether a value of JSON is an object. */
+export function isObject(value) {
   return typeof value === "object" && value !== null && !Array.isArray(value);
 }

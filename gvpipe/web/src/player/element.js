@@ -8,7 +8,7 @@
  * ("azimuth,elevation" of the first view, degrees), `shading` ("flat": each triangle has one normal),
  * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up).
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
+ * the frame's number), `levelchange` (detail: the level of detail that is shown), `shotchange` (detail: the number of the shot that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
@@ -248,6 +248,16 @@ export class GeometryVideoElement extends Base {
     this.setAttribute("lod", lod);
   }
 
+  /** Runs of frames of one connectivity (`GeometryVideo.shots`); [] while nothing is loaded. */
+  get shots() {
+    return this.video?.shots ?? [];
+  }
+
+  /** The number of the shot that is shown. */
+  get shot() {
+    return this.video?.shot ?? 0;
+  }
+
   /** The colour map of fields, one of `COLORMAPS`. */
   get colormap() {
     const name = this.getAttribute("colormap");
@@ -405,6 +415,12 @@ export class GeometryVideoElement extends Base {
       }
       this.#tell("levelchange", level);
     });
+    mesh.addEventListener("shotchange", ({ shot }) => {
+      this.#probe.close(); // it has other vertices
+      this.#bar.setNotes(mesh.notes);
+      this.#showMenus();
+      this.#tell("shotchange", shot);
+    });
     for (const name of ["progress", "durationchange"]) {
       mesh.addEventListener(name, () => {
         this.#bar.setVideo(this.video);
@@ -419,6 +435,25 @@ export class GeometryVideoElement extends Base {
     this.#bar.setNotes(mesh.notes);
     this.#panel.setVideo(this.video, mesh.partNames);
     this.hide(this.#hidden);
+  }
+
+  /** The menus and the legend of a shot; those of the shot before stay where it has the same fields and parts. */
+  #showMenus() {
+    const { video } = this;
+    if (this.#panel.differs(video, this.#mesh.partNames)) {
+      this.#panel.setVideo(video, this.#mesh.partNames);
+      this.#panel.setHidden(this.#hidden);
+      const mover = this.warp?.name ?? usualMover(video.fields);
+      this.#panel.setWarp(mover, this.warp?.scale ?? 0, mover === null ? 1 : mostScale(video, video.fields.get(mover)));
+    }
+    this.#showLegend(video.fields.get(this.getAttribute("field")) ?? null, this.#mesh.fieldRange);
+  }
+
+  #showLegend(field, range) {
+    const hasMap = field !== null && field.kind !== "color";
+    this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
+    if (hasMap) this.#legend.show(field, this.colormap, range, isLogarithmic(this.scale, range));
+    else this.#legend.hide();
   }
 
   /**
@@ -488,17 +523,15 @@ export class GeometryVideoElement extends Base {
     this.#say(field ? `Decoding ${field.name} …` : "");
     let range;
     try {
-      range = await this.#stage.showField(field && field.name, { colormap: this.colormap, range: this.range, scale: this.scale });
+      const name = field?.name ?? (video.shots.length > 1 ? this.getAttribute("field") : null); // another shot may have it
+      range = await this.#stage.showField(name, { colormap: this.colormap, range: this.range, scale: this.scale });
     } catch (error) {
       if (video === this.video) this.#interrupt(error);
       return;
     }
     if (showing !== this.#showing || !this.#mesh) return;
     this.#say("");
-    const hasMap = field !== null && field.kind !== "color";
-    this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
-    if (hasMap) this.#legend.show(field, this.colormap, range, isLogarithmic(this.scale, range));
-    else this.#legend.hide();
+    if (range) this.#showLegend(field, range);
     this.#probe.setField(field);
   }
 
