@@ -13,6 +13,8 @@ import { kernelCode } from "./wasm/inflated.js";
 const BYTES_PER_VERTEX = 12; // of a frame
 const BYTES_PER_FRAME = 160; // that a clock keeps
 
+let canRun = null; // whether the browser runs the kernels, once that was asked
+
 /**
  * @typedef {object} Playable
  * @property {Uint32Array} faces (T, 3) flat @property {Int32Array} basePoints (V, 3) flat: equal rows are one point of the surface
@@ -40,7 +42,8 @@ export async function openCodec(source, payload, repeated, level, signal, shared
     throw new GeometryVideoError("newer", `${found}, this player has ${newest}; a newer player is needed`);
   }
   const code = await kernelCode();
-  if (!WebAssembly.validate(code)) {
+  canRun ??= WebAssembly.validate(code);
+  if (!canRun) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);

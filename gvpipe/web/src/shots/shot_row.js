@@ -8,7 +8,7 @@ import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
 import { RepeatedFrames } from "../format/repeated_frames.js";
 
 const LEAST_OPEN = 8; // shots
-const OPEN_VERTICES = 200_000; // of all shots that stay open: a vertex takes some hundred bytes
+const OPEN_VERTICES = 400_000; // of all shots that stay open: a vertex takes some hundred bytes
 const BYTES_PER_VERTEX = 12; // of a frame
 const EMPTY = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
 
