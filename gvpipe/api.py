@@ -26,7 +26,7 @@ from gvpipe.foundation import notes
 from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
-from gvpipe.foundation.errors import InputError, OverBudget, SettingError, TopologyChange, in_file
+from gvpipe.foundation.errors import InputError, OverBudget, SettingError, SeveralShots, TopologyChange, in_file
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
 from gvpipe.model.capture import Capture
@@ -228,8 +228,7 @@ def encode(
         options |= {"real_time": real_time, "warp": warp, "volume": volume}
         beside = AssetOptions.of(attributes, fields, textures)
         if isinstance(source, Capture):
-            capture = source if frames is None else source.part(*frames)
-            capture = capture if fps is None else capture.with_fps(fps)
+            capture = _some_of(source, frames, fps)
             return _encode_capture(capture, request, path, beside, memory, layout, clock)
         try:
             sequence = _open_source(source, path, fps, options)
@@ -363,11 +362,12 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
 
     Raises:
         InputError: no such file, or the frames or the level are not in it.
+        SeveralShots: the frames are of several shots of a capture, which `open_capture` reads.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = Player(path, unlimited=unlimited)
+    player, shift = _player_of(path, start, stop, unlimited)
     first_kernels.expect(player.bitstream.codec)
-    start, stop = frame_range(player, start, stop)
+    start, stop = frame_range(player, start - shift, None if stop is None else stop - shift)
     if lod:
         whole = player.level(lod)
         positions = whole.read(start, stop)
@@ -375,6 +375,18 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
     return dataclasses.replace(whole, positions=positions, fields=fields)
+
+
+def _player_of(path: StrPath, start: int, stop: int | None, unlimited: bool) -> tuple[Player, int]:
+    """What has some frames, and the first one's number: a geometry video, or a shot of a capture."""
+    try:
+        return Player(path, unlimited=unlimited), 0
+    except SeveralShots:
+        video = CapturePlayer(path, unlimited=unlimited)
+        (number, _, _), *others = video.capture().spans(start, stop)
+        if others:
+            raise
+        return video.shot(number), video.starts[number]
 
 
 def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlimited: bool = False) -> Restreamed:
@@ -398,7 +410,10 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
     if layout not in (None, PLAIN, STREAM):
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
     check_video_target(path, "gvpipe.restream's path")
-    bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    try:
+        bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    except SeveralShots as exc:
+        raise InputError(f"{source} is a capture, whose index comes first in any case; it needs no other layout") from exc
     chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
     if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
         bitstream = dataclasses.replace(bitstream, is_bare=False)
@@ -512,7 +527,7 @@ def skin(
 
 
 def render(
-    source: MeshSequence | StrPath,
+    source: MeshSequence | Capture | StrPath,
     path: StrPath,
     *,
     frame: int | None = None,
@@ -544,7 +559,7 @@ def render(
     Materials, textures and vertex colours show if the sequence has them.
 
     Args:
-        source: a sequence, or what `gvpipe.read` takes.
+        source: a sequence, a capture, or what `gvpipe.read` takes; vertices and triangles may change.
         path: the file to write; an older one is replaced once the new one is complete.
         frame: the only frame to paint, of ``frames``, negative from the end; by default the first for a PNG, all for a film.
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
@@ -575,6 +590,7 @@ def render(
             part, a texture without its uv attribute.
         OutputError: the file cannot be written; no part of it is left.
     """
+    from gvpipe.rendering.capture_films import write_capture_pictures
     from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
 
     check_target(path)
@@ -603,12 +619,27 @@ def render(
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
-    if isinstance(source, MeshSequence):
-        sequence = source if frames is None else source.part(*frame_range(source, *frames))
-        sequence = sequence if fps is None else sequence.with_fps(fps)
-    else:
-        sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited, volume=cut is not None)
-    return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
+    if isinstance(source, Capture):
+        return list(write_capture_pictures(_some_of(source, frames, fps), target, options, progress))
+    reading: dict[str, Any] = {"unlimited": unlimited, "volume": cut is not None}
+    try:
+        if isinstance(source, MeshSequence):
+            sequence = source if frames is None else source.part(*frame_range(source, *frames))
+            sequence = sequence if fps is None else sequence.with_fps(fps)
+        else:
+            sequence = read(source, fps, clip, mesh, frames, **reading)
+        return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
+    except TopologyChange:
+        if isinstance(source, MeshSequence) or reference is not None:
+            raise
+    capture = read_capture(source, fps, clip, mesh, frames, **reading)
+    return list(write_capture_pictures(capture, target, options, progress))
+
+
+def _some_of(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:
+    """Some frames of a capture, at another rate."""
+    capture = capture if frames is None else capture.part(*frames)
+    return capture if fps is None else capture.with_fps(fps)
 
 
 def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywords: Any) -> dict[str, Any]:
@@ -796,9 +827,9 @@ def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     return []
 
 
-def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
+def _is_among(path: StrPath, source: MeshSequence | Capture | Source) -> bool:
     """Whether the output is one of the inputs."""
-    if isinstance(source, MeshSequence) or not os.path.exists(path):
+    if isinstance(source, MeshSequence | Capture) or not os.path.exists(path):
         return False
     sources = [source] if isinstance(source, str | os.PathLike) else source
     return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)

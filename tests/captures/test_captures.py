@@ -179,9 +179,64 @@ def test_command_line(run: Run, tmp_path: Path) -> None:
     assert ended.status == 0 and (tmp_path / "c.pvd").is_file()
 
 
+def test_pictures(video: Path, tmp_path: Path) -> None:
+    """One camera for all shots, as for one mesh that has them all; a colour means the same in all."""
+    from PIL import Image
+
+    def painted(frame: int, **options: Any) -> Any:
+        gvpipe.render(sheets(), tmp_path / "a.png", frame=frame, size=96, **options)
+        return np.asarray(Image.open(tmp_path / "a.png").convert("RGB"), int)
+
+    with gvpipe.open_capture(video) as found:
+        gvpipe.render(found.capture(), tmp_path / "b.gif", size=96)
+    with Image.open(tmp_path / "b.gif") as film:
+        assert getattr(film, "n_frames", 0) == 6
+    spans = [np.ptp(np.argwhere(np.ptp(painted(frame, view="top"), axis=2) > 9), axis=0) for frame in (0, 4, 5)]
+    assert np.abs(np.diff(spans, axis=0)).max() <= 6  # the same sheet in other triangles, a little nearer each time
+    gvpipe.render(video, tmp_path / "c.png", frame=-1, size=64)
+    assert (tmp_path / "c.png").is_file()
+    with pytest.raises(InputError, match="frame 6 asked for"):
+        gvpipe.render(video, tmp_path / "d.png", frame=6)
+
+
+def test_colours_of_a_field_in_all_shots(tmp_path: Path) -> None:
+    shots = [
+        shot.reading_from(shot.positions, None, fields={"heat": np.full((len(shot), shot.n_vertices), float(number))})
+        for number, shot in enumerate(sheets().shots)
+    ]
+    from PIL import Image
+
+    pictures = []
+    for frame in (0, 3, 5):
+        gvpipe.render(gvpipe.Capture(shots), tmp_path / "a.gif", size=160, field="heat", view="front")
+        with Image.open(tmp_path / "a.gif") as film:
+            film.seek(frame)
+            pictures.append(np.asarray(film.convert("RGB"), int))
+    colours = [picture[80, 115] for picture in pictures]  # of the sheet's middle
+    assert len({tuple(colour) for colour in colours}) == 3
+
+
+def test_decode_and_restream(video: Path, tmp_path: Path) -> None:
+    assert gvpipe.decode(video, 3, 5).shape == (2, 49, 3) and gvpipe.decode(video, 4, 5)[0].shape == (49, 3)
+    with pytest.raises(SeveralShots):
+        gvpipe.decode(video)
+    with pytest.raises(InputError, match="needs no other layout"):
+        gvpipe.restream(video, tmp_path / "a.mp4")
+
+
 def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="leave out bare"):
         gvpipe.encode(sheets(), tmp_path / "a.mp4", bare=True)
     with pytest.raises(InputError, match=r"shot 0 \(frames 0 to 2\): "):
         gvpipe.encode(sheets(), tmp_path / "a.mp4", target_bpvf=0.001)
     assert not list(tmp_path.iterdir())
+
+
+def test_among_many(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "many" / "sheets"
+    folder.mkdir(parents=True)
+    write_objs(folder)
+    ended = run("encode-all", tmp_path / "many", tmp_path / "out", "--json")
+    assert ended.status == 0 and json.loads(ended.out)["encoded"] == 1
+    ended = run("pack", tmp_path / "out", tmp_path / "s-%05d.tar")
+    assert ended.status == 1 and "a capture of 3 shots" in ended.err
