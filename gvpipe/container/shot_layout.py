@@ -7,7 +7,7 @@ shots have in common, such as pictures of textures, are stored once (`gvpipe.con
     file  = ftyp, moov (without pictures), index, shared sections, poster, shots
     index = "uuid" box SHOTS_UUID: magic, [u16] version, [varint] bytes of the header, header, [u32] CRC-32 of all before
     header = a JSON object in UTF-8, deflated (zlib): "fps", "id", "head": bytes and CRC-32 of ftyp and moov, "poster": bytes,
-             "shots": "frames", "vertices", "triangles" and "bytes" of each, "shared": bytes by hash, in order, "box": see `ShotIndex`
+             "shots": "frames", "vertices", "triangles" and "bytes" of each, "shared": bytes by hash in order, "box" (optional)
     the shared sections lie in one "uuid" box DATA_UUID, if there are any; each shot in a "uuid" box SHOT_UUID
     id    = first 16 bytes, in hex, of the SHA-256 over the shared sections and the shots' files in order
 
@@ -79,8 +79,8 @@ class ShotIndex:
         shared: offset and bytes of shared sections, by hash.
         head: bytes of ``ftyp`` and ``moov``.
         poster: offset and bytes.
-        box: smallest and largest x, y and z of the shots' first frames, before coding, model units, relative to the origin of the
-            first shot, so that a player has a view before it has decoded them; None: not known.
+        box: smallest and largest x, y and z of the shots' first frames, before coding, model units, relative to the first
+            shot's origin, so that a player has a view before it has decoded them; None: not known.
     """
 
     source: Source

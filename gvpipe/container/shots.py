@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from gvpipe.container.bitstream import Bitstream
@@ -45,6 +45,27 @@ def write_shots(
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
+    packed = pack_row(poster, shots, fps, parts)
+    size = 0
+    with unnamed_path(path) as temporary, open(temporary, "wb") as file:
+        for part in packed.data:
+            size += file.write(part)
+    return WrittenShots(size, packed.n_bytes, packed.sections)
+
+
+@dataclass(frozen=True)
+class PackedShots:
+    """The parts of a capture's file, bytes of each shot in it, and of its sections by name."""
+
+    data: Iterable[bytes]
+    n_bytes: list[int]
+    sections: dict[str, int]
+
+
+def pack_row(
+    poster: bytes, shots: Sequence[Bitstream], fps: float, parts: Mapping[int, SegmentParts] | None = None
+) -> PackedShots:
+    """The file that `write_shots` would write."""
     parts = parts or {}
     hashes = [_hashes(shot) if number not in parts else {} for number, shot in enumerate(shots)]
     counts = Counter(digest for found in hashes for digest in set(found.values()))
@@ -60,11 +81,10 @@ def write_shots(
         bare = replace(shot, is_bare=True)
         data = file_bytes(shot, parts[number]) if number in parts else file_bytes(bare, shared=left_out)
         files.append(ShotFile(data, shot.n_frames, shot.n_vertices, shot.n_triangles))
-    size = 0
-    with unnamed_path(path) as temporary, open(temporary, "wb") as file:
-        for part in pack_shots(poster, files, shared, fps, _box(shots)):
-            size += file.write(part)
-    return WrittenShots(size, [len(file.data) for file in files], {name: number for name, number in sections.items() if number})
+    packed = pack_shots(poster, files, shared, fps, _box(shots))
+    return PackedShots(
+        packed, [len(file.data) for file in files], {name: number for name, number in sections.items() if number}
+    )
 
 
 def _hashes(shot: Bitstream) -> dict[str, str]:

@@ -84,7 +84,8 @@ export class Ranges {
     const { response } = asked;
     if (response.status !== PARTIAL) throw asked.refused(); // 200: the whole file would come
     const data = await asked.bytes();
-    if (this.#total && totalOf(response) && totalOf(response) !== this.#total) throw this.isAnother();
+    const isChanged = this.#total && totalOf(response) && totalOf(response) !== this.#total;
+    if (isChanged && !isFresh) throw this.isAnother(); // a file that is still written grows
     if (!mayEnd || data.length > length) checkLength(data, length, wanted);
     this.received += data.length;
     return data;
