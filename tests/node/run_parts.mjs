@@ -34,6 +34,17 @@ const commands = {
     const frame = await video.frame(k);
     return { positions: [...frame], bounds: video.bounds };
   },
+  /** Shots of a file on a server or on the disk, and frames in this order, with what is theirs. */
+  async shots({ url, path, frames }) {
+    video?.close();
+    video = await GeometryVideo.load(url ?? new Uint8Array(readFileSync(path)));
+    const found = [];
+    for (const k of frames) {
+      const positions = await video.frame(k);
+      found.push({ positions: [...positions], indices: [...video.indices], shot: video.shot, own: video.ownFrame(k) });
+    }
+    return { shots: video.shots, duration: video.duration, bounds: video.bounds, images: video.images.map(({ data }) => data.length), found };
+  },
   async level({ level }) {
     await video.setLevel(level);
     return [video.level, video.vertexCount, video.triangleCount, video.indices.length];

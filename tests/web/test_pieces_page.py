@@ -61,6 +61,6 @@ def test_refusals(pieces: list[Path], tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"a-000\.mp4 is one of several, which are not converted; encode it for browsers"):
         gvpipe.export_html(pieces[0], tmp_path / "a.html", then=pieces[1:], convert=True)
     gvpipe.encode(waving(5, 3).with_fps(24.0), tmp_path / "fast.mp4", "pca")
-    with pytest.raises(InputError, match=r"a-000\.mp4 plays at 12 frames per second and .*fast\.mp4 at 24; a page has one rate"):
+    with pytest.raises(InputError, match=r"a-000\.mp4 plays at 12 frames per second and .* at 24; a page has one rate"):
         gvpipe.export_html(pieces[0], tmp_path / "a.html", then=[tmp_path / "fast.mp4"])
     assert not (tmp_path / "a.html").exists()

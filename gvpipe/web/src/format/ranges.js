@@ -131,12 +131,13 @@ export class Bytes {
 /** The same file in larger parts, the last of which are kept: what lies beside each other comes by one request. */
 export class Blocks {
   #source;
-  #blocks = []; // {start, end, data: a promise}, the one used last at the end
+  #blocks; // {start, end, data: a promise}, the one used last at the end
 
-  /** @param {Ranges|Bytes} source @param {number} size bytes of the file */
-  constructor(source, size) {
+  /** @param {Ranges|Bytes} source @param {number} size bytes of the file @param {Uint8Array} first bytes of it */
+  constructor(source, size, first) {
     this.#source = source;
     this.size = size;
+    this.#blocks = [{ start: 0, end: first.length, data: Promise.resolve(first) }];
   }
 
   get isWaiting() {

@@ -81,7 +81,7 @@ export async function readShots(source, start, box) {
   });
   if (source.size < at) throw new GeometryVideoError("truncated", `it ends ${at - source.size} bytes early; ${AGAIN}`);
   if (source.size > at) throw new GeometryVideoError("corrupt", `${source.size - at} stray bytes follow its last box; ${AGAIN}`);
-  const blocks = new Blocks(source, at);
+  const blocks = new Blocks(source, at, start);
   if (shared.size) await checkBox(blocks, sharedAt, DATA_UUID, sharedBytes, "its shared sections are not where the index says");
   const kept = new Map(); // hash -> promise
   const find = async (hash) => {
