@@ -79,8 +79,8 @@ class ShotIndex:
         shared: offset and bytes of shared sections, by hash.
         head: bytes of ``ftyp`` and ``moov``.
         poster: offset and bytes.
-        box: smallest and largest x, y and z of the shots' first frames, before coding, model units, relative to the first
-            shot's origin, so that a player has a view before it has decoded them; None: not known.
+        box: smallest and largest x, y and z of frames, before coding, model units, relative to the first shot's origin, so that
+            a player has a view before it has decoded them; None: not known.
     """
 
     source: Source

@@ -32,6 +32,7 @@ def write_shots(
     shots: Sequence[Bitstream],
     fps: float,
     parts: Mapping[int, SegmentParts] | None = None,
+    box: Sequence[float] | None = None,
 ) -> WrittenShots:
     """Write a capture, all of it or nothing.
 
@@ -41,11 +42,12 @@ def write_shots(
         shots: in order, of one rate.
         fps: the rate, frames per second.
         parts: of shots that are written in the stream layout, what each segment has; the others get the bare one.
+        box: that the motion stays in, as of `ShotIndex`; None: that of the shots' first frames.
 
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
-    packed = pack_row(poster, shots, fps, parts)
+    packed = pack_row(poster, shots, fps, parts, box)
     size = 0
     with unnamed_path(path) as temporary, open(temporary, "wb") as file:
         for part in packed.data:
@@ -63,7 +65,11 @@ class PackedShots:
 
 
 def pack_row(
-    poster: bytes, shots: Sequence[Bitstream], fps: float, parts: Mapping[int, SegmentParts] | None = None
+    poster: bytes,
+    shots: Sequence[Bitstream],
+    fps: float,
+    parts: Mapping[int, SegmentParts] | None = None,
+    box: Sequence[float] | None = None,
 ) -> PackedShots:
     """The file that `write_shots` would write."""
     parts = parts or {}
@@ -81,7 +87,7 @@ def pack_row(
         bare = replace(shot, is_bare=True)
         data = file_bytes(shot, parts[number]) if number in parts else file_bytes(bare, shared=left_out)
         files.append(ShotFile(data, shot.n_frames, shot.n_vertices, shot.n_triangles))
-    packed = pack_shots(poster, files, shared, fps, _box(shots))
+    packed = pack_shots(poster, files, shared, fps, box or _box(shots))
     return PackedShots(
         packed, [len(file.data) for file in files], {name: number for name, number in sections.items() if number}
     )

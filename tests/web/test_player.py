@@ -10,10 +10,9 @@ from typing import Any
 
 import browsers
 import numpy as np
-import numpy.typing as npt
 import pytest
 from folders import DOCS
-from pages import LOAD, PAINTED, Mask, encode_file, flipped, run, silhouette
+from pages import LOAD, PAINTED, encode_file, flipped, run, silhouette
 from PIL import Image
 from sequences import waving
 
