@@ -1,6 +1,6 @@
 /** The element `<geometry-video>`; to import this defines it. */
 
-import type { GeometryVideo, Picked, Source } from "./geometry-video.js";
+import type { GeometryVideo, Picked, Shot, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -11,6 +11,8 @@ export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, 
   frame: CustomEvent<number>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
+  /** The number of the shot that is shown, of a capture. */
+  shotchange: CustomEvent<number>;
   /** A point was clicked on. */
   probe: CustomEvent<Probed>;
   /** `detail` is a `GeometryVideoError` if the file or its server is at fault. */
@@ -64,6 +66,10 @@ export class GeometryVideoElement extends HTMLElement {
 
   readonly video: GeometryVideo | null;
   readonly currentFrame: number;
+  /** Runs of frames of one connectivity; [] while nothing is loaded. */
+  readonly shots: Shot[];
+  /** The number of the shot that is shown. */
+  readonly shot: number;
   /** Shows frame k, and pauses; while a file loads, once it is there. Of many calls in a row the last counts. */
   seek(k: number): Promise<void>;
   readonly colormap: string;

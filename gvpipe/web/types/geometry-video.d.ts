@@ -165,6 +165,15 @@ export interface Image {
   readonly data: Uint8Array;
 }
 
+/** A run of frames of one connectivity. */
+export interface Shot {
+  /** The first frame. */
+  readonly start: number;
+  readonly frames: number;
+  readonly vertices: number;
+  readonly triangles: number;
+}
+
 export class GeometryVideo {
   private constructor();
   /**
@@ -177,6 +186,17 @@ export class GeometryVideo {
   readonly fps: number;
   readonly vertexCount: number;
   readonly triangleCount: number;
+  /** In order; a file whose vertices and triangles never change has one. */
+  readonly shots: Shot[];
+  /**
+   * The number of the shot that is shown: of the frame that was given last. Numbers of vertices and triangles, `indices`, `basePoints`
+   * and what lies beside positions are its own.
+   */
+  readonly shot: number;
+  /** The number of a frame's shot. */
+  shotOf(k: number): number;
+  /** The number that a frame of the shot that is shown has in it, which is that of frames of its fields. */
+  ownFrame(k: number): number;
   /** Bytes of the file. */
   readonly byteLength: number;
   /** Seconds; `Infinity` while the file is still written. */
