@@ -175,13 +175,18 @@ export class GeometryVideo {
   lost = () => {};
 
   /**
-   * Hear of both, beside those two functions.
+   * Hear of both, beside those two functions; of a capture, have something `ready` before frames are shown (`ShotRow.prepare`).
    *
-   * @param {{grown: () => void, lost: (error: Error) => void}} follower @returns {() => void} what ends it
+   * @param {{grown: () => void, lost: (error: Error) => void, ready?: (video: GeometryVideo, shot: number, frame: number) => Promise<void>,
+   *   closed?: (shot: number) => void}} follower @returns {() => void} what ends it
    */
   follow(follower) {
     this.#followers.add(follower);
-    return () => this.#followers.delete(follower);
+    const unprepare = follower.ready && this.#row?.prepare(follower);
+    return () => {
+      this.#followers.delete(follower);
+      unprepare?.();
+    };
   }
 
   constructor(header, byteLength, repeated, reader, pictures) {
@@ -207,11 +212,6 @@ export class GeometryVideo {
   /** The number that a frame of the shot that is shown has in it: that of frames of fields. @param {number} k */
   ownFrame(k) {
     return this.#row ? k - this.#row.shots[this.shot].start : k;
-  }
-
-  /** Of a capture, have something ready before frames are shown (`ShotRow.prepare`). @returns {() => void} what ends it */
-  prepare(preparer) {
-    return this.#row ? this.#row.prepare(preparer) : () => {};
   }
 
   /** `{min, max}`: the box that the motion stays in, model units. Of a file in segments without pictures: of those read so far. */

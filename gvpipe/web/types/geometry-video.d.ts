@@ -209,8 +209,16 @@ export class GeometryVideo {
   grown: () => void;
   /** Called when it cannot be followed any longer. */
   lost: (error: Error) => void;
-  /** Hear of both, beside those two functions; returns what ends it. */
-  follow(follower: { grown: () => void; lost: (error: Error) => void }): () => void;
+  /**
+   * Hear of both, beside those two functions; returns what ends it. Of a capture, `ready` is called before a frame is shown, with its
+   * shot and its number in it, and waited for; `closed` when a shot is let go of.
+   */
+  follow(follower: {
+    grown: () => void;
+    lost: (error: Error) => void;
+    ready?: (video: GeometryVideo, shot: number, frame: number) => Promise<unknown>;
+    closed?: (shot: number) => void;
+  }): () => void;
   /** Seconds that play without a wait for the file: `[start, end]` of each stretch. */
   readonly buffered: [number, number][];
   /** Bits per second. */

@@ -95,8 +95,9 @@ export class ShotRow {
   /**
    * Have something ready before a frame is shown.
    *
-   * @param {{ready: (video: import("../geometry_video.js").GeometryVideo, shot: number, frame: number) => Promise<void>, closed: (shot: number) => void}} preparer
-   *   `ready` is given the shot and the frame's number in it; `closed` is told of a shot that is let go of
+   * @param {{ready: (video: import("../geometry_video.js").GeometryVideo, shot: number, frame: number) => Promise<void>,
+   *   closed?: (shot: number) => void}} preparer `ready` is given the shot and the frame's number in it; `closed` is told of a shot that is
+   *   let go of
    * @returns {() => void} what ends it
    */
   prepare(preparer) {
@@ -196,7 +197,7 @@ export class ShotRow {
       opened.then(({ video }) => video.close()).catch(() => {});
       const { start, frames: length } = this.shots[number];
       this.#clock?.forget(start, start + length);
-      for (const preparer of this.#preparers) preparer.closed(number);
+      for (const preparer of this.#preparers) preparer.closed?.(number);
     }
   }
 

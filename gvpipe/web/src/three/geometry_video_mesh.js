@@ -106,11 +106,9 @@ export class GeometryVideoMesh extends Mesh {
       fail: (error) => this.dispatchEvent({ type: "error", error }),
     };
     const grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
-    const unfollow = video.follow({ grown, lost: on.fail });
     if (video.shots.length > 1) this.#shotTextures = new ShotTextures(video.shot, textures, view.anisotropy);
     const ready = (shot, number, own) => Promise.all([this.#shotTextures.ready(shot, number), this.#loadFields(shot, own)]);
-    const unprepare = video.prepare({ ready, closed: (number) => this.#shotTextures.closed(number) });
-    this.#unfollow = () => [unfollow, unprepare].forEach((end) => end());
+    this.#unfollow = video.follow({ grown, lost: on.fail, ready, closed: (number) => this.#shotTextures.closed(number) });
     this.#playback = new Playback(video, on, view.ownClock ? undefined : (tick) => (this.#tick = tick));
   }
 
