@@ -20,6 +20,7 @@ from gvpipe.container import bare
 from gvpipe.container.bitstream import CHECKSUM, VERSION
 from gvpipe.container.boxes import read_box, uuid_head
 from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.container.shot_layout import HEAD as HEAD_FIELDS
 from gvpipe.container.shot_layout import MAGIC, SHOT_UUID
 from gvpipe.container.sources import BytesSource
 from gvpipe.container.stream_layout import DATA_UUID, SHOTS_UUID, find_index
@@ -62,6 +63,7 @@ def join_capture(parts: Parts) -> dict[str, bytes]:
     shared = [data for name, data in parts.items() if name.startswith(SHARED)]
     shots = [data for name, data in parts.items() if name.startswith(SHOT)]
     packed = MAGIC + VERSION.to_bytes(2, "little") + pack_block(zlib.compress(_measured(parts, shared, shots), 9))
+    packed += HEAD_FIELDS.pack(len(parts[HEAD]), zlib.crc32(parts[HEAD]))
     packed += CHECKSUM.pack(zlib.crc32(packed))
     content = [parts[HEAD], uuid_head(SHOTS_UUID, len(packed)), packed]
     if shared:
@@ -77,7 +79,6 @@ def _measured(parts: Parts, shared: list[bytes], shots: list[bytes]) -> bytes:
         return index
     try:
         values = json.loads(index)
-        values["head"] = [len(parts[HEAD]), zlib.crc32(parts[HEAD])]
         values["poster"] = len(parts[POSTER])
         values["shots"]["bytes"] = [len(data) for data in shots]
         values["shared"] = dict(zip(values["shared"], map(len, shared), strict=True))

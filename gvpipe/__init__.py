@@ -28,10 +28,13 @@ if TYPE_CHECKING:
     from gvpipe.grids.cells import Cells
     from gvpipe.grids.volume import Volume
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
+    from gvpipe.media.sound import Sound
+    from gvpipe.media.sound_files import read_sound
     from gvpipe.metrics.comparison import Comparison
     from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
+    from gvpipe.notebook import show
     from gvpipe.playback.capture_player import CapturePlayer
     from gvpipe.playback.files import read, read_capture, write
     from gvpipe.playback.live import LiveEncoder, open_live
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
     from gvpipe.playback.video_info import Info, info
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
+    from gvpipe.recording import Recorder, RigidParts, record
     from gvpipe.web import ExportReport, export_html
 
 __all__ = [
@@ -60,10 +64,13 @@ __all__ = [
     "Metadata",
     "Part",
     "Player",
+    "Recorder",
     "Renderer",
     "Report",
     "Restreamed",
+    "RigidParts",
     "Skin",
+    "Sound",
     "Texture",
     "Volume",
     "compare",
@@ -79,8 +86,11 @@ __all__ = [
     "open_live",
     "read",
     "read_capture",
+    "read_sound",
+    "record",
     "render",
     "restream",
+    "show",
     "skin",
     "write",
 ]
@@ -97,9 +107,12 @@ _HOMES = {
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
+    "gvpipe.notebook": ("show",),
     "gvpipe.playback.capture_player": ("CapturePlayer",),
     "gvpipe.playback.files": ("read", "read_capture", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
+    "gvpipe.media.sound": ("Sound",),
+    "gvpipe.media.sound_files": ("read_sound",),
     "gvpipe.metrics.comparison": ("Comparison",),
     "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),
@@ -107,6 +120,7 @@ _HOMES = {
     "gvpipe.model.capture": ("Capture",),
     "gvpipe.model.sequence": ("MeshSequence",),
     "gvpipe.model.skin": ("Skin",),
+    "gvpipe.recording": ("Recorder", "RigidParts", "record"),
     "gvpipe.playback.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }

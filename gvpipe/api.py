@@ -15,12 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.options import AssetOptions
+from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
+from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
+from gvpipe.asset_coding.sound_track import read_sound as read_sound_track
 from gvpipe.captures.encoding import CodedShot, write_capture
 from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
 from gvpipe.coding.segment_memory import fit_segments
-from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
-from gvpipe.container.mp4 import bytes_by_part, file_bytes, read_bytes, read_file, write_file
+from gvpipe.container.bitstream import BARE, LIVE, PLAIN, SHOTS, STREAM, Bitstream
+from gvpipe.container.mp4 import bytes_by_part, file_bytes, load, read_bytes, read_file, write_file
+from gvpipe.container.shots import copy_shots
 from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
 from gvpipe.foundation import notes
 from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
@@ -28,6 +32,7 @@ from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.errors import InputError, OverBudget, SettingError, SeveralShots, TopologyChange, in_file
 from gvpipe.foundation.progress import Progress
+from gvpipe.media.sound import Sound
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
 from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
@@ -36,6 +41,7 @@ from gvpipe.model.warp import warped
 from gvpipe.playback.capture_player import CapturePlayer
 from gvpipe.playback.files import Source, frame_range, read, read_capture
 from gvpipe.playback.player import Player
+from gvpipe.playback.sounds import AudioOptions, sound_beside, with_sound
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
@@ -77,6 +83,7 @@ class Report:
             given or codecs competed; else empty.
         shots: of a capture: ``start``, ``frames``, ``vertices``, ``triangles``, ``codec`` and ``bytes`` of each. Then
             ``vertices`` and ``triangles`` are those of the largest, ``codec`` and ``settings`` those of the first.
+        audio: as in `Info`.
     """
 
     codec: str
@@ -95,6 +102,7 @@ class Report:
     notes: list[str]
     errors: dict[str, float | None] = field(default_factory=dict)
     shots: list[dict[str, Any]] = field(default_factory=list)
+    audio: dict[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -106,13 +114,15 @@ class Restreamed:
     """What `restream` did.
 
     Args:
-        layout: of the file that it wrote: ``plain`` or ``stream``.
+        layout: of the file that it wrote: ``plain``, ``stream``, or ``shots`` of a capture.
         bytes_before, bytes: of the source and of the file.
+        notes: what a user should know, a line each.
     """
 
     layout: str
     bytes_before: int
     bytes: int
+    notes: list[str] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """The same as JSON values."""
@@ -164,7 +174,11 @@ def encode(
     scheduler: str | None = None,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = None,
+    audio: StrPath | Sound | bool | None = None,
+    audio_codec: str | None = None,
+    audio_bitrate: int | None = None,
+    audio_trim: bool = False,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -195,7 +209,9 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp, volume: as for `read`. The volume of a sequence is always coded.
+        clip, mesh, frames, unlimited, real_time, warp: as for `read`.
+        volume: whether what lies inside of a simulation's surface is coded, too. None: of a sequence or a geometry video, yes;
+            of other files, if it takes less than a third of the other bytes. A note says what was chosen.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
@@ -203,6 +219,10 @@ def encode(
             one for each core, once a minute of work is left and no ``memory`` is given; None: here.
         scheduler: code them on the Dask cluster of this address, such as ``"tcp://host:8786"``, whose workers read ``source``
             at the same path (extra ``cluster``).
+        audio: the file of a sound, or a `Sound`; second 0 is the source's first frame, and ``frames`` cut it too. None: the
+            source's own, of a geometry video; False: none.
+        audio_codec, audio_bitrate: of a file, as for `read_sound`.
+        audio_trim: let the sound end with the film, if not before.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, no quality meets the target, or a worker cannot work.
@@ -213,6 +233,7 @@ def encode(
 
     check_video_target(path, "gvpipe.encode's path")
     _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
+    sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
     request = _Request(codec, settings, purpose, (target_rmse, target_kg, target_bpvf, max_error))
     given = request.candidates()
     is_shared = workers == AUTO_WORKERS and scheduler is None
@@ -225,26 +246,29 @@ def encode(
     layout = STREAM if stream else BARE if bare else PLAIN
     with open_executor(scheduler, workers) as executor:
         options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
-        options |= {"real_time": real_time, "warp": warp, "volume": volume}
+        options |= {"real_time": real_time, "warp": warp}
         beside = AssetOptions.of(attributes, fields, textures)
         if isinstance(source, Capture):
             capture = _some_of(source, frames, fps)
-            return _encode_capture(capture, request, path, beside, memory, layout, clock)
+            return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
         try:
-            sequence = _open_source(source, path, fps, options)
+            sequence, spares_volume, chosen = _open_with_inside(source, path, fps, options, volume)
+            sequence = with_sound(sequence, sounds, frames)
+            options["volume"] = sequence.volume is not None
             if memory is not None:
                 given = fit_segments(given, sequence.n_vertices, memory)
             target = _target(sequence, *request.targets)
-            asset = AssetCoder(sequence, beside)
+            asset = AssetCoder(sequence, dataclasses.replace(beside, spares_volume=spares_volume))
             with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
                 coded = _code(sequence, given, target, asset, bare, clock)
         except TopologyChange:
             if isinstance(source, MeshSequence):
                 raise
-            capture = read_capture(source, fps, **options)
-            return _encode_capture(capture, request, path, beside, memory, layout, clock)
+            capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
+            return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
     size, bitstream = _write(sequence, coded, path, clock, layout)
     clock("", 1.0)
+    chosen += () if asset.volume_choice is None else (asset.volume_choice.note,)
     return Report(
         codec=coded.codec.id,
         settings=dataclasses.asdict(coded.codec),
@@ -255,11 +279,12 @@ def encode(
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
-        not_carried=[*sorted(asset.plan.left_out), *sequence.not_carried],
+        not_carried=[*sorted(asset.plan.left_out), *asset.carried.not_carried],
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=[*_notes(sequence, target, asset.plan), *_refusal(path, bitstream, size)],
+        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *chosen, *_refusal(path, bitstream, size)],
+        audio=None if asset.sound is None else asset.sound.to_json(),
         errors={} if coded.errors is None else dataclasses.asdict(coded.errors),
     )
 
@@ -284,6 +309,8 @@ def _encode_capture(
     request: _Request,
     path: StrPath,
     beside: AssetOptions,
+    sounds: AudioOptions,
+    frames: tuple[int, int | None] | None,
     memory: int | None,
     layout: str,
     clock: _StageClock,
@@ -302,7 +329,7 @@ def _encode_capture(
         if is_free and len(shot) == 1 and isinstance(fitting, Codec):  # nobody knows its vertices from other frames
             fitting = dataclasses.replace(fitting, reorder=True)
         target = _shot_target(shot, request.targets, diagonal)
-        asset = AssetCoder(shot, beside)
+        asset = AssetCoder(shot.with_sound(None), beside)
         coded = _code(shot, fitting, target, asset, True, progress)
         x, y, z = shot.origin.tolist()
         bitstream = dataclasses.replace(coded.encoded.bitstream, origin=(x, y, z), is_bare=True)
@@ -311,9 +338,13 @@ def _encode_capture(
         left_out = [*sorted(asset.plan.left_out), *shot.not_carried]
         return CodedShot(bitstream, coded.codec, _notes(shot, target, asset.plan), left_out)
 
-    found = write_capture(capture, path, code, clock, layout == STREAM)
+    sound, heard = sound_beside(capture.sound, len(capture) / capture.fps, sounds, capture.fps, frames)
+    sound, damaged = whole_sound(sound)
+    companions = () if sound is None else (pack_sound(sound),)
+    found = write_capture(capture, path, code, clock, layout == STREAM, companions)
     clock("", 1.0)
-    first, size, many = found.coded[0], found.written.size, len(capture.shots) > 1
+    first, size = found.coded[0], found.written.size
+    many = [notes.shots(capture.name, len(capture.shots), capture.starts[1])] if len(capture.shots) > 1 else []
     return Report(
         codec=first.codec.id,
         settings=dataclasses.asdict(first.codec),
@@ -328,8 +359,9 @@ def _encode_capture(
         sections={**found.written.sections, "container": size - sum(found.written.sections.values())},
         tried=[],
         reason="",
-        notes=[notes.shots(capture.name, len(capture.shots), capture.starts[1]), *found.notes] if many else found.notes,
+        notes=[*many, *heard, *damaged, *found.notes],
         shots=found.shots,
+        audio=None if sound is None else sound.to_json(),
     )
 
 
@@ -374,7 +406,7 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     else:  # positions before faces: the video decodes on other threads while the mesh does on this one
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
-    return dataclasses.replace(whole, positions=positions, fields=fields)
+    return dataclasses.replace(whole, positions=positions, fields=fields, sound=whole.sound_of(start, stop))
 
 
 def _player_of(path: StrPath, start: int, stop: int | None, unlimited: bool) -> tuple[Player, int]:
@@ -389,8 +421,18 @@ def _player_of(path: StrPath, start: int, stop: int | None, unlimited: bool) -> 
         return video.shot(number), video.starts[number]
 
 
-def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlimited: bool = False) -> Restreamed:
-    """Change the layout of a geometry video, without loss: sections and pictures stay as they are, to the bit.
+def restream(
+    source: StrPath,
+    path: StrPath,
+    layout: str | None = None,
+    *,
+    unlimited: bool = False,
+    audio: StrPath | Sound | bool | None = None,
+    audio_codec: str | None = None,
+    audio_bitrate: int | None = None,
+    audio_trim: bool = False,
+) -> Restreamed:
+    """Change the layout of a geometry video, without loss: sections, pictures and sound stay as they are, to the bit.
 
     The *stream* layout has an index first, then each segment's sections beside its pictures. It plays over HTTP while it
     loads, and a jump costs one segment. The *plain* layout is a little smaller. A file of the *bare* layout gets the poster
@@ -401,28 +443,59 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
         path: of the file to write.
         layout: ``"stream"`` or ``"plain"``; None: ``"stream"`` for plain and unfinished files, ``"plain"`` for others.
         unlimited: as for `open`.
+        audio, audio_codec, audio_bitrate, audio_trim: as for `encode`: another sound, or none; the layout then stays, unless
+            another is asked for.
 
     Raises:
-        InputError: no such file, or no such layout.
+        InputError: no such file, no such layout, or a sound that cannot be read.
         FormatError: not a geometry video, or a damaged one.
         OutputError: the file cannot be written; no part of it is left.
     """
     if layout not in (None, PLAIN, STREAM):
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
     check_video_target(path, "gvpipe.restream's path")
+    sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
     try:
         bitstream = read_file(check_path(source, "the geometry video"), unlimited)
-    except SeveralShots as exc:
-        raise InputError(f"{source} is a capture, whose index comes first in any case; it needs no other layout") from exc
-    chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
+    except SeveralShots:
+        return _restream_capture(source, path, layout, unlimited, sounds)
+    kept = bitstream.layout if not sounds.is_empty and bitstream.layout in (PLAIN, STREAM) else None
+    chosen = layout or kept or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
+    bitstream, said = _with_audio(bitstream, os.fspath(source), sounds)
     if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
         bitstream = dataclasses.replace(bitstream, is_bare=False)
         if not bitstream.video:
             with Player(source, unlimited=unlimited) as player:
                 bitstream = dataclasses.replace(bitstream, video=poster_of(player.sequence()), outline=player.outline())
     with in_file(os.fspath(source)):
+        bitstream = load(bitstream)
         size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
-    return Restreamed(chosen, bitstream.n_bytes, size)
+    return Restreamed(chosen, bitstream.n_bytes, size, [*bitstream.lost, *said])
+
+
+def _restream_capture(source: StrPath, path: StrPath, layout: str | None, unlimited: bool, sounds: AudioOptions) -> Restreamed:
+    """Copy a capture with another sound."""
+    if layout is not None or sounds.is_empty:
+        raise InputError(f"{source} is a capture, whose index comes first in any case; it needs no other layout")
+    video = CapturePlayer(source, unlimited=unlimited)
+    index = video.index
+    assert index is not None
+    with in_file(os.fspath(source)):
+        sound, said = sound_beside(video.sound, len(video) / video.fps, sounds)
+        others = tuple(each for each in index.companions if each.kind != SOUND_KIND)
+        size = copy_shots(index, path, (*(() if sound is None else (pack_sound(sound),)), *others))
+    return Restreamed(SHOTS, index.size, size, [*index.lost, *said])
+
+
+def _with_audio(bitstream: Bitstream, name: str, sounds: AudioOptions) -> tuple[Bitstream, tuple[str, ...]]:
+    """A file's bitstream with the sound that is asked for, and what is said of it; ``name`` is the file's."""
+    if sounds.is_empty:
+        return bitstream, ()
+    others = tuple(each for each in bitstream.companions if each.kind != SOUND_KIND)
+    with in_file(name):
+        sound, said = sound_beside(read_sound_track(bitstream.companions)[0], bitstream.n_frames / bitstream.fps, sounds)
+        own = () if sound is None else (pack_sound(sound),)
+    return dataclasses.replace(bitstream, companions=(*own, *others)), said
 
 
 def open(path: StrPath, *, unlimited: bool = False, shared: Callable[[str], bytes] | None = None) -> Player:
@@ -472,7 +545,7 @@ def compare(
     if any(each.volume is not None for each in both):
         pairs = zip(given.values(), both, strict=True)
         both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-    return measure(both[0], both[1], progress)
+    return measure(both[0], both[1], progress).of(reference, distorted)
 
 
 def _as_sequence(given: MeshSequence | Player | Source, volume: bool = False) -> MeshSequence:
@@ -710,6 +783,26 @@ def _open_source(
     if _is_among(path, source):
         raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
     return read(source, fps, **options)
+
+
+def _open_with_inside(
+    source: MeshSequence | Source, path: StrPath, fps: float | None, options: dict[str, Any], volume: bool | None
+) -> tuple[MeshSequence, bool, tuple[str, ...]]:
+    """The sequence to encode, whether its volume is left out where it costs too much, and a note on what was chosen by now."""
+    from gvpipe.asset_coding.volume_choice import MOST_NUMBERS, count_note, times_the_surface, without_volume
+
+    sequence = _open_source(source, path, fps, {**options, "volume": bool(volume)})
+    if volume is False:
+        return without_volume(sequence), False, ()
+    times = times_the_surface(sequence)
+    if volume or isinstance(source, MeshSequence) or times is None or sequence.volume is not None:
+        return sequence, False, ()
+    if times > MOST_NUMBERS:
+        return sequence, False, (count_note(times),)
+    try:
+        return read(source, fps, **{**options, "volume": True}), True, ()
+    except InputError:  # of what lies inside alone
+        return sequence, False, ()
 
 
 @contextlib.contextmanager

@@ -16,11 +16,13 @@ class AssetOptions:
     Args:
         attributes, fields: bounds by name (`gvpipe.asset_coding.bounds.precision`); others have the default.
         textures: what images may be.
+        spares_volume: whether what lies inside is left out where it costs much (`gvpipe.asset_coding.volume_choice`).
     """
 
     attributes: Given = field(default_factory=dict)
     fields: Given = field(default_factory=dict)
     textures: TextureLimit = field(default_factory=TextureLimit)
+    spares_volume: bool = False
 
     @classmethod
     def of(cls, attributes: Given | None, fields: Given | None, textures: int | str | None) -> Self:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from gvpipe.coding.codec import Codec
 from gvpipe.coding.registry import segment_parts
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.companion import Companion
 from gvpipe.container.shots import WrittenShots, write_shots
 from gvpipe.foundation.arguments import StrPath
 from gvpipe.foundation.arrays import Float64
@@ -69,6 +70,7 @@ def write_capture(
     code: Callable[[MeshSequence, Progress], CodedShot],
     progress: Progress,
     is_stream: bool = False,
+    companions: Sequence[Companion] = (),
 ) -> WrittenCapture:
     """Code each shot and write them as one file, all of it or nothing.
 
@@ -77,6 +79,7 @@ def write_capture(
         path: of the file.
         code: codes one of them.
         progress: called with a stage's name and the part of the whole that is done.
+        companions: tracks beside the video.
         is_stream: whether long shots are written so that a jump in them loads a segment alone.
 
     Raises:
@@ -102,7 +105,8 @@ def write_capture(
     parts = {number: segment_parts(each) for number, each in enumerate(bitstreams) if not each.is_bare}
     progress("write", 0.0)
     low, high = (choose(corners, axis=0) - first.origin for choose in (np.min, np.max))
-    written = write_shots(path, poster, bitstreams, capture.fps, parts, [*low.tolist(), *high.tolist()])
+    box = [*low.tolist(), *high.tolist()]
+    written = write_shots(path, poster, bitstreams, capture.fps, parts, companions, box)
     rows = [
         {
             "start": start,

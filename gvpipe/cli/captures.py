@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gvpipe.cli.audio_options import write_beside
 from gvpipe.cli.pipes import STDIN, STDOUT, shown
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ def write_shots(
     options: dict[str, Any],
     progress: Progress | None,
     out: Output,
+    sound: tuple[str | None, str | None],
 ) -> None:
     """Write a capture, and print what was done.
 
@@ -34,6 +36,7 @@ def write_shots(
         options: ``parts``, ``compress``, ``fps``, and what others ask for, by name; what is not empty cannot be done.
         progress: called with what is done.
         out: where results are printed.
+        sound: where its sound goes, and what ``--audio-out`` says.
 
     Raises:
         click.UsageError: an option that is for sequences alone.
@@ -52,6 +55,8 @@ def write_shots(
     shots = LazyShots(len(capture.shots), lambda number: chosen(capture.shots[number], parts, fps, "write", progress))
     given = Capture(shots, capture.name, capture.lengths, capture.fps if fps is None else fps)
     names, noticed = write_capture_files(given, path, start, compress)
+    heard, said = write_beside(capture.sound, *sound)
+    noticed += said
     for note in noticed:
         out.note(note)
     shown_names = [shown(target, STDOUT)] if names == [path] else names
@@ -72,6 +77,7 @@ def write_shots(
             "shots": rows,
             "notes": noticed,
         }
+        | ({"audio": {"output": sound[0], **heard.to_json()}} if heard else {})
     )
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     shape = f"{count(len(capture), 'frame')} in {count(len(capture.shots), 'shot')}"

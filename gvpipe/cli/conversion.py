@@ -90,7 +90,7 @@ def convert(
     max_error: str | None,
     real_time: bool,
     warp: str | None,
-    volume: bool,
+    volume: bool | None,
     compress: str,
     unlimited: bool,
     out: Output,
@@ -112,7 +112,7 @@ def convert(
         read_clips,
         smaller_without,
     )
-    from gvpipe.io.writing import is_glb, takes_skin
+    from gvpipe.io.writing import HOLD_VOLUMES, is_glb, takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
@@ -121,6 +121,8 @@ def convert(
     number, is_rigid = parse_joints(joints)
     wanted = SkinOptions(number, target_kg, max_error, is_rigid, correctives)
     check_glb_options(target, skin, compress, wanted)
+    if volume is None and Path(target).suffix.lower() not in HOLD_VOLUMES:
+        volume = False
     how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
     if split:
         if clip == ALL or lod or start is not None or stop is not None or target == PIPE:
@@ -162,10 +164,12 @@ def convert(
     except TopologyChange:
         if skin or lod or clip == ALL:
             raise
+        from gvpipe.cli.audio_options import NO_SOUND
+
         with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
             capture = files.read_capture(given, clip=clip, mesh=mesh, **how).part(first, last)
             asked = {"parts": parts, "compress": compress, "fps": fps}
-            write_shots(capture, source, target, path, first, asked, progress, out)
+            write_shots(capture, source, target, path, first, asked, progress, out, (None, NO_SOUND))
         return
     for note in noticed:
         out.note(note)

@@ -4,10 +4,11 @@ Each shot is a whole file of the bare or the stream layout, so that whatever rea
 comes first: who wants a frame reads the index, then the file of its shot or what of it is asked for. Sections that several
 shots have in common, such as pictures of textures, are stored once (`gvpipe.container.shared_sections`)::
 
-    file  = ftyp, moov (without pictures), index, shared sections, poster, shots
-    index = "uuid" box SHOTS_UUID: magic, [u16] version, [varint] bytes of the header, header, [u32] CRC-32 of all before
-    header = a JSON object in UTF-8, deflated (zlib): "fps", "id", "head": bytes and CRC-32 of ftyp and moov, "poster": bytes,
-             "shots": "frames", "vertices", "triangles" and "bytes" of each, "shared": bytes by hash in order, "box" (optional)
+    file  = ftyp, moov (without pictures), index, shared sections, poster, shots, samples of companions
+    index = "uuid" box SHOTS_UUID: magic, [u16] version, [varint] bytes of the header, header, [u32] bytes of ftyp and moov,
+            [u32] their CRC-32 without companions, [u32] CRC-32 of all before
+    header = a JSON object in UTF-8, deflated (zlib): "fps", "id", "poster": bytes, "shots": "frames", "vertices", "triangles"
+             and "bytes" of each, "shared": bytes by hash, in order, "box", "companions" (`gvpipe.container.companion`)
     the shared sections lie in one "uuid" box DATA_UUID, if there are any; each shot in a "uuid" box SHOT_UUID
     id    = first 16 bytes, in hex, of the SHA-256 over the shared sections and the shots' files in order
 
@@ -18,9 +19,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from uuid import UUID
 
@@ -33,14 +35,16 @@ from gvpipe.container.bitstream import (
     VERSION,
     check_version,
 )
-from gvpipe.container.boxes import Box, read_box, uuid_head
+from gvpipe.container.boxes import BOX, Box, read_box, uuid_head
+from gvpipe.container.companion import SECTION as COMPANION
+from gvpipe.container.companion import Companion, attach_head, describe, detach_head, read_described, without_companions
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.fragments import split_fragments
 from gvpipe.container.json_object import unpack_json
 from gvpipe.container.sample_tables import check_no_samples
 from gvpipe.container.shared_sections import HASH, MAX_SHARED
 from gvpipe.container.sources import Source, SourceWindow
-from gvpipe.container.stream_layout import DATA_UUID, MAX_INDEX, SHOTS_UUID
+from gvpipe.container.stream_layout import DATA_UUID, MAX_INDEX, SHOTS_UUID, Place, StoredSections
 from gvpipe.container.track import TAG_PREFIX, remux_fragments
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import TruncatedFile, corrupt, corrupt_section
@@ -52,9 +56,9 @@ MAX_SHOTS = 1 << 16
 MAX_HEADER = 1 << 22  # bytes, inflated
 MAX_BYTES = 1 << 40  # of a shot
 MAX_POSTER = 1 << 32
-MAX_CRC = (1 << 32) - 1
-BOX = "box"
+MOTION = "box"  # key of the header
 FARTHEST = 1e39  # of a corner of the box, model units
+HEAD = struct.Struct("<II")
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,8 @@ class ShotIndex:
         shared: offset and bytes of shared sections, by hash.
         head: bytes of ``ftyp`` and ``moov``.
         poster: offset and bytes.
+        companions: tracks beside the video, of the whole film.
+        lost: what is wrong with other companions, a line each.
         box: smallest and largest x, y and z of frames, before coding, model units, relative to the first shot's origin, so that
             a player has a view before it has decoded them; None: not known.
     """
@@ -93,6 +99,8 @@ class ShotIndex:
     shared: Mapping[str, tuple[int, int]]
     head: bytes
     poster: tuple[int, int]
+    companions: tuple[Companion, ...] = ()
+    lost: tuple[str, ...] = ()
     box: tuple[float, ...] | None = None
 
     @property
@@ -114,6 +122,7 @@ def pack_shots(
     shots: Sequence[ShotFile],
     shared: Mapping[str, bytes],
     fps: float,
+    companions: Sequence[Companion] = (),
     box: Sequence[float] | None = None,
 ) -> Iterator[bytes]:
     """Yield the bytes of a file, in order.
@@ -123,19 +132,22 @@ def pack_shots(
         shots: in order.
         shared: sections that the shots leave out, by hash.
         fps: frames per second.
+        companions: tracks beside the video.
         box: as of `ShotIndex`.
+
+    Raises:
+        InputError: companions would lie too far back for their tables.
     """
     content = hashlib.sha256()
     for data in (*shared.values(), *(shot.data for shot in shots)):
         content.update(data)
     identity = content.hexdigest()[:32]
     fragmented = remux_fragments(poster, f"{VERSION} {identity}")
-    head, fragments = split_fragments(fragmented)
+    own_head, fragments = split_fragments(fragmented)
     pictures = b"".join(part for each in fragments for part in (each.moof, each.mdat))
     header = {
         "fps": fps,
         "id": identity,
-        "head": [len(head), zlib.crc32(head)],
         "poster": len(pictures),
         "shots": {
             "frames": [shot.n_frames for shot in shots],
@@ -144,19 +156,23 @@ def pack_shots(
             "bytes": [len(shot.data) for shot in shots],
         },
         "shared": {digest: len(data) for digest, data in shared.items()},
-        **({} if box is None else {BOX: list(box)}),
+        **({} if box is None else {MOTION: list(box)}),
+        **describe(companions),
     }
     packed = zlib.compress(json.dumps(header, separators=(",", ":"), allow_nan=False).encode(), 9)
-    index = MAGIC + VERSION.to_bytes(2, "little") + pack_block(packed)
-    index += CHECKSUM.pack(zlib.crc32(index))
-    yield from (head, uuid_head(SHOTS_UUID, len(index)), index)
+    content_boxes: list[bytes] = []
     if shared:
-        yield uuid_head(DATA_UUID, sum(map(len, shared.values())))
-        yield from shared.values()
-    yield pictures
+        content_boxes += uuid_head(DATA_UUID, sum(map(len, shared.values()))), *shared.values()
+    content_boxes.append(pictures)
     for shot in shots:
-        yield uuid_head(SHOT_UUID, len(shot.data))
-        yield shot.data
+        content_boxes += uuid_head(SHOT_UUID, len(shot.data)), shot.data
+    index = MAGIC + VERSION.to_bytes(2, "little") + pack_block(packed)
+    n_index = len(index) + HEAD.size + CHECKSUM.size
+    index_head = uuid_head(SHOTS_UUID, n_index)
+    n_head = len(attach_head(own_head, companions, 0)[0])
+    head, samples = attach_head(own_head, companions, n_head + len(index_head) + n_index + sum(map(len, content_boxes)))
+    index += HEAD.pack(n_head, zlib.crc32(without_companions(head)))
+    yield from (head, index_head, index + CHECKSUM.pack(zlib.crc32(index)), *content_boxes, *samples)
 
 
 def read_shots(source: Source, box: Box, budget: Budget = UNLIMITED) -> ShotIndex:
@@ -184,6 +200,7 @@ def read_shots(source: Source, box: Box, budget: Budget = UNLIMITED) -> ShotInde
     if CHECKSUM.unpack(data[-CHECKSUM.size :]) != (zlib.crc32(data[: -CHECKSUM.size]),):
         raise cursor.corrupt("its checksum does not match")
     header = unpack_json(cursor.block(), NAME, MAX_HEADER, budget)
+    head_size, checksum = cursor.struct(HEAD)
     cursor.end()
     fps = header.number("fps", SLOWEST, FASTEST)
     columns = header.object("shots")
@@ -208,25 +225,32 @@ def read_shots(source: Source, box: Box, budget: Budget = UNLIMITED) -> ShotInde
     poster_at, at = at, at + poster
     heads = [len(uuid_head(SHOT_UUID, length)) for length in n_bytes]
     ends = list(accumulate((head + length for head, length in zip(heads, n_bytes, strict=True)), initial=at))
-    if source.size < ends[-1]:
-        raise TruncatedFile(f"it ends {ends[-1] - source.size} bytes early; get the file again from its source")
-    if source.size > ends[-1]:
-        raise corrupt(f"{source.size - ends[-1]} stray bytes follow its last box")
+    described, at = read_described(header), ends[-1]
+    beside: dict[str, Place] = {}
+    for number, each in enumerate(described):
+        beside[f"{COMPANION}{number}"] = Place(at + BOX.size, each.n_bytes, each.checksum)
+        at += BOX.size + each.n_bytes
+    if source.size < at:
+        raise TruncatedFile(f"it ends {at - source.size} bytes early; get the file again from its source")
+    if source.size > at:
+        raise corrupt(f"{source.size - at} stray bytes follow its last box")
     offsets = tuple(end - length for end, length in zip(ends[1:], n_bytes, strict=True))
-    head_size, checksum = header.integers("head", 2, 0, MAX_CRC)
     if head_size != box.start:
         raise corrupt_section(NAME, "its place is not behind the description of the video")
     head = source.read(0, head_size)
-    if zlib.crc32(head) != checksum:
+    own_head = without_companions(head)
+    if zlib.crc32(own_head) != checksum:
         raise corrupt("the description of its video is damaged")
-    moov = head[head.find(b"moov") - 4 :]
+    moov = own_head[own_head.find(b"moov") - 4 :]
     check_no_samples(moov)
     if f"{TAG_PREFIX}{VERSION} {header.text('id')}".encode("utf-8", "replace") not in moov:
         raise corrupt("its shots belong to another file")
-    corners = header.numbers(BOX, 6, -FARTHEST, FARTHEST) if BOX in header else None
+    corners = header.numbers(MOTION, 6, -FARTHEST, FARTHEST) if MOTION in header else None
     if corners is not None and any(low > high for low, high in zip(corners[:3], corners[3:], strict=True)):
-        raise header.wrong(BOX, "smallest before largest corners")
-    return ShotIndex(source, fps, frames, vertices, triangles, n_bytes, offsets, places, head, (poster_at, poster), corners)
+        raise header.wrong(MOTION, "smallest before largest corners")
+    found = detach_head(head, described, StoredSections(source, beside))
+    index = ShotIndex(source, fps, frames, vertices, triangles, n_bytes, offsets, places, own_head, (poster_at, poster))
+    return replace(index, companions=found.companions, lost=found.lost, box=corners)
 
 
 def _content(source: Source, at: int, uuid: UUID, length: int) -> int:

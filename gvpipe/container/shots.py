@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.companion import Companion
 from gvpipe.container.mp4 import bytes_by_part, file_bytes
 from gvpipe.container.segments import SegmentParts
 from gvpipe.container.shared_sections import section_hash
-from gvpipe.container.shot_layout import ShotFile, pack_shots
+from gvpipe.container.shot_layout import ShotFile, ShotIndex, pack_shots
 from gvpipe.foundation.atomic import unnamed_path
 
 LEAST_SHARED = 64  # bytes of a section that is shared: its hash takes 35
@@ -32,6 +33,7 @@ def write_shots(
     shots: Sequence[Bitstream],
     fps: float,
     parts: Mapping[int, SegmentParts] | None = None,
+    companions: Sequence[Companion] = (),
     box: Sequence[float] | None = None,
 ) -> WrittenShots:
     """Write a capture, all of it or nothing.
@@ -42,16 +44,14 @@ def write_shots(
         shots: in order, of one rate.
         fps: the rate, frames per second.
         parts: of shots that are written in the stream layout, what each segment has; the others get the bare one.
+        companions: tracks beside the video, of the whole film.
         box: that the motion stays in, as of `ShotIndex`; None: that of the shots' first frames.
 
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
-    packed = pack_row(poster, shots, fps, parts, box)
-    size = 0
-    with unnamed_path(path) as temporary, open(temporary, "wb") as file:
-        for part in packed.data:
-            size += file.write(part)
+    packed = pack_row(poster, shots, fps, parts, companions, box)
+    size = _write(path, packed.data)
     return WrittenShots(size, packed.n_bytes, packed.sections)
 
 
@@ -69,6 +69,7 @@ def pack_row(
     shots: Sequence[Bitstream],
     fps: float,
     parts: Mapping[int, SegmentParts] | None = None,
+    companions: Sequence[Companion] = (),
     box: Sequence[float] | None = None,
 ) -> PackedShots:
     """The file that `write_shots` would write."""
@@ -87,10 +88,33 @@ def pack_row(
         bare = replace(shot, is_bare=True)
         data = file_bytes(shot, parts[number]) if number in parts else file_bytes(bare, shared=left_out)
         files.append(ShotFile(data, shot.n_frames, shot.n_vertices, shot.n_triangles))
-    packed = pack_shots(poster, files, shared, fps, box or _box(shots))
-    return PackedShots(
-        packed, [len(file.data) for file in files], {name: number for name, number in sections.items() if number}
-    )
+    for companion in companions:
+        sections[companion.kind] += companion.n_bytes
+    packed = pack_shots(poster, files, shared, fps, companions, box or _box(shots))
+    n_bytes = [len(file.data) for file in files]
+    return PackedShots(packed, n_bytes, {name: number for name, number in sections.items() if number})
+
+
+def copy_shots(index: ShotIndex, path: str | os.PathLike[str], companions: Sequence[Companion]) -> int:
+    """Write a capture again, with other companions; return the file's bytes.
+
+    Raises:
+        OutputError: the file cannot be written; an older file of that name is left as it was.
+        FormatError: the capture is damaged.
+    """
+    poster = index.head + index.source.read(*index.poster)
+    columns = zip(index.frames, index.vertices, index.triangles, strict=True)
+    files = [ShotFile(index.source.read(index.offsets[k], index.n_bytes[k]), *counts) for k, counts in enumerate(columns)]
+    shared = {digest: index.find(digest) for digest in index.shared}
+    return _write(path, pack_shots(poster, files, shared, index.fps, companions, index.box))
+
+
+def _write(path: str | os.PathLike[str], parts: Iterable[bytes]) -> int:
+    size = 0
+    with unnamed_path(path) as temporary, open(temporary, "wb") as file:
+        for part in parts:
+            size += file.write(part)
+    return size
 
 
 def _hashes(shot: Bitstream) -> dict[str, str]:

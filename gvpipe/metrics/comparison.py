@@ -10,8 +10,11 @@ and R. Klein, Simple and efficient compression of animation sequences, 2005 (``d
 
 from __future__ import annotations
 
+import os
+import weakref
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +61,34 @@ class Comparison:
     def to_json(self) -> dict[str, object]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
         return asdict(self)
+
+    def of(self, reference: object, distorted: object) -> Comparison:
+        """The same, which notebooks show with players of both sides: paths, or objects, as long as others hold them."""
+        object.__setattr__(self, "_sides", [_held(each) for each in (reference, distorted)])
+        return self
+
+    @property
+    def sides(self) -> list[Any]:
+        """What was compared, reference first; [] if it is gone, or was never told."""
+        sides = [side() if isinstance(side, weakref.ref) else side for side in self.__dict__.get("_sides", ())]
+        return [] if any(side is None for side in sides) else sides
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_sides"}
+
+    def _repr_html_(self) -> str:
+        from gvpipe.metrics.comparison_page import comparison_html
+
+        return comparison_html(self.to_json())
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
+
+
+def _held(given: object) -> Any:
+    return given if isinstance(given, str | os.PathLike | list | tuple) else weakref.ref(given)
 
 
 def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDone | None = None) -> Comparison:

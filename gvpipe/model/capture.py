@@ -13,6 +13,7 @@ from itertools import accumulate
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import count
+from gvpipe.media.sound import Sound
 from gvpipe.model.sequence import MeshSequence
 
 
@@ -23,6 +24,8 @@ class Capture:
         shots: the sequences, in order; a row that makes each when it is asked for will do, if ``lengths`` are given.
         name: where it came from, for messages.
         lengths: frames of each shot, and ``fps`` of all, of a row that should not be looked at yet.
+
+        sound: what is heard with it; second 0 is frame 0. Sounds of shots are not.
 
     Raises:
         InputError: there is no shot, or they differ in frames per second.
@@ -43,6 +46,7 @@ class Capture:
         name: str = "capture",
         lengths: Sequence[int] | None = None,
         fps: float | None = None,
+        sound: Sound | None = None,
     ) -> None:
         if not len(shots):
             raise InputError(f"{name} has no shots; one at least is needed")
@@ -55,6 +59,7 @@ class Capture:
                         f"shots of {name} have {shots[0].fps:g} and {shot.fps:g} fps; give them one rate (with_fps)"
                     )
             lengths = [len(shot) for shot in shots]
+        self.sound = sound
         self.shots, self.name, self.fps = shots, name, shots[0].fps if fps is None else fps
         self.lengths: tuple[int, ...] = tuple(lengths)
         self.starts: tuple[int, ...] = (0, *accumulate(self.lengths[:-1]))
@@ -105,12 +110,16 @@ class Capture:
             sequence = self.shots[shot]
             return sequence if (first, last) == (0, len(sequence)) else sequence.part(first, last)
 
-        return Capture(LazyShots(len(spans), made), self.name, [last - first for _, first, last in spans], self.fps)
+        lengths = [last - first for _, first, last in spans]
+        sound, end = self.sound, start + sum(lengths)
+        if sound is not None:
+            sound = sound.part(start / self.fps, None if end == len(self) else end / self.fps)
+        return Capture(LazyShots(len(spans), made), self.name, lengths, self.fps, sound)
 
     def with_fps(self, fps: float) -> Capture:
         """The same shots at another rate; raises `InputError`: it is not above 0 and up to 100000."""
         shots = LazyShots(len(self.shots), lambda number: self.shots[number].with_fps(fps))
-        return Capture(shots, self.name, self.lengths, fps)
+        return Capture(shots, self.name, self.lengths, fps, self.sound)
 
 
 class LazyShots(Sequence[MeshSequence]):

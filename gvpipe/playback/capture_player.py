@@ -10,12 +10,14 @@ from functools import partial
 from types import TracebackType
 from typing import Any
 
+from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.container.mp4 import read_index
 from gvpipe.container.shot_layout import ShotIndex
 from gvpipe.container.sources import is_remote
 from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32
 from gvpipe.foundation.errors import corrupt, in_file
+from gvpipe.media.sound import Sound
 from gvpipe.model.capture import Capture, LazyShots
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.playback.player import Player
@@ -94,7 +96,12 @@ class CapturePlayer:
     def capture(self) -> Capture:
         """The shots as sequences, whose frames are decoded when they are read."""
         shots = LazyShots(len(self.lengths), lambda number: self.shot(number).sequence())
-        return Capture(shots, self.path, self.lengths, self.fps)
+        return Capture(shots, self.path, self.lengths, self.fps, self.sound)
+
+    @property
+    def sound(self) -> Sound | None:
+        """What is heard with the frames, None if the file has none; its samples are read when they are asked for."""
+        return self.shot(0).sound if self.index is None else read_sound(self.index.companions)[0]
 
     @property
     def starts(self) -> tuple[int, ...]:
@@ -104,7 +111,8 @@ class CapturePlayer:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the shots, a line each; opens all of them."""
-        return tuple(dict.fromkeys(note for shot in self.shots for note in shot.notes))
+        lost = () if self.index is None else (*self.index.lost, *read_sound(self.index.companions)[1])
+        return tuple(dict.fromkeys([*lost, *(note for shot in self.shots for note in shot.notes)]))
 
     def frame(self, frame: int) -> MeshSequence:
         """A frame with all that belongs to it, as a sequence of one; raises IndexError."""

@@ -34,7 +34,7 @@ def read(
     unlimited: bool = False,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = False,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
@@ -50,18 +50,28 @@ def read(
             become a film of 25 frames a second. The times are kept either way.
         warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
         volume: whether what lies inside of a simulation's surface is read, too: volume cells, inner points, and their numbers.
+            None: where there is something.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
         SettingError: ``warp`` is of another form.
         TypeError: it is no path.
     """
-    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, volume)
+    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, bool(volume))
+    if volume is None and has_inside(sequence):
+        sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, True)
     if warp is None:
         return sequence
     from gvpipe.model.warp import warped
 
     return warped(sequence, warp)
+
+
+def has_inside(sequence: MeshSequence) -> bool:
+    """Whether its source has volume cells, which were not read."""
+    from gvpipe.io.left_behind import VOLUME_CELLS, count_of
+
+    return count_of(sequence.not_carried, VOLUME_CELLS) > 0
 
 
 def _read(
@@ -162,7 +172,7 @@ def read_runs(
     unlimited: bool = False,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = False,
 ) -> list[Run]:
     """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
 

@@ -19,6 +19,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory, file_notes
 from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.coding.codec import GroupReader, LevelReader
 from gvpipe.coding.registry import codec_class, codec_ids, open_reader, read_skin
 from gvpipe.container.bitstream import Bitstream
@@ -30,6 +31,7 @@ from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
 from gvpipe.grids.volume import Volume
+from gvpipe.media.sound import Sound
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
 from gvpipe.model.skin import Skin
@@ -88,6 +90,11 @@ class Player:
         return partial(type(self), unlimited=self._unlimited, data=self._data, shared=self._find), (self._absolute,)
 
     @property
+    def on_disk(self) -> str | None:
+        """Absolute path of the file; None for one in memory, or at an address."""
+        return None if self._data is not None or is_remote(self.path) else self._absolute
+
+    @property
     def faces(self) -> Int32:
         """``(T, 3) int32`` triangles."""
         with in_file(self.path):
@@ -136,6 +143,11 @@ class Player:
         """What lies inside of the surface, of a simulation; None where the file has nothing of it."""
         with in_file(self.path):
             return self._asset.volume
+
+    @property
+    def sound(self) -> Sound | None:
+        """What is heard with the frames, None if the file has none; its samples are read when they are asked for."""
+        return read_sound(self.bitstream.companions)[0]
 
     @property
     def times(self) -> Float64:
@@ -236,6 +248,7 @@ class Player:
             images=self.images,
             metadata=self.metadata,
             volume=self.volume,
+            sound=self.sound,
         )
 
     def __len__(self) -> int:
@@ -275,6 +288,11 @@ class Player:
         numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
         numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
         return card(self.path, numbers, sequence)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
 
     def __enter__(self) -> Player:
         return self

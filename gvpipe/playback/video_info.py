@@ -42,6 +42,7 @@ class Info:
         images: name, media type, width, height and bytes.
         metadata: up axis, unit, start time, source, texts.
         volume: of what lies inside of the surface: cells, inner points, the bound on these, names of numbers, bytes; or None.
+        audio: codec, channels, rate, seconds, start (seconds after frame 0) and bytes of the sound; or None.
         not_carried: what the source had beside what the file carries.
         notes: what a user should know, a line each.
         shots: of a capture: ``start``, ``frames``, ``vertices``, ``triangles``, ``codec`` and ``bytes`` of each. Then
@@ -70,6 +71,7 @@ class Info:
     images: list[dict[str, Any]]
     metadata: dict[str, Any]
     volume: dict[str, Any] | None
+    audio: dict[str, Any] | None
     not_carried: list[str]
     notes: list[str]
     shots: list[dict[str, Any]] = field(default_factory=list)
@@ -98,8 +100,11 @@ def _capture_info(path: StrPath, unlimited: bool) -> Info:
 
     with CapturePlayer(path, unlimited=unlimited) as video:
         found = [_info(shot.bitstream, shot.outline(), shot.path) for shot in video.shots]
-        starts, sizes, size = video.starts, video.shot_bytes, video.n_bytes
+        starts, sizes, size, sound = video.starts, video.shot_bytes, video.n_bytes, video.sound
+        beside = () if video.index is None else video.index.companions
     sections = sum((Counter({**each.sections, "container": 0}) for each in found), Counter[str]())
+    for companion in beside:
+        sections[companion.kind] += companion.n_bytes
     n_samples = sum(each.vertices * each.frames for each in found)
     rows = [
         {
@@ -115,6 +120,7 @@ def _capture_info(path: StrPath, unlimited: bool) -> Info:
     return dataclasses.replace(
         found[0],
         layout=SHOTS,
+        audio=None if sound is None else sound.to_json(),
         vertices=max(each.vertices for each in found),
         triangles=max(each.triangles for each in found),
         frames=sum(each.frames for each in found),

@@ -14,6 +14,7 @@ is measured and reported.
 from __future__ import annotations
 
 import base64
+import functools
 import html
 import os
 import zlib
@@ -91,6 +92,7 @@ def export_html(
     log: bool = False,
     speed: float = 1.0,
     warp: str | None = None,
+    clip: str | None = None,
     camera: str | tuple[float, float] | None = None,
     shading: str = "smooth",
     unlimited: bool = False,
@@ -112,6 +114,8 @@ def export_html(
         log: let colours follow the logarithm of the field; what is not above 0 is grey.
         speed: 0.0625 to 16; 1 is the video's own.
         warp: ``"NAME"`` or ``"NAME:SCALE"``: a field of vectors on vertices that moves them, so many times as far.
+        clip: a plane that cuts the mesh: ``"x=0.3"`` (model units), ``"y=30%"`` (of the first frame's box), ``"-x=0.3"``
+            (what lies below is left out). The section of a volume is filled.
         camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
         shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
@@ -135,8 +139,9 @@ def export_html(
     if up is None:
         found = shots[0].metadata.up_axis
         up = found if found in AXES else "y"
-    options = {"colormap": colormap, "log": log, "speed": speed, "camera": camera, "shading": shading}
+    options = {"colormap": colormap, "log": log, "speed": speed, "clip": clip, "camera": camera, "shading": shading}
     view = _view_of(shots, field, field_range, warp, options)
+    view = replace(view, muted=any(video.sound is not None for video in videos))
     if len(shots) > 1 or videos[0].index:
         report = _write_page(videos[0].path, _row(videos, shots, convert), target, up, view)
         return replace(report, unfinished=any(shot.bitstream.is_unfinished for shot in shots))
@@ -186,6 +191,11 @@ def _row(videos: Sequence[CapturePlayer], shots: Sequence[Player], convert: bool
     index = videos[0].index
     if len(videos) == 1 and index is not None:
         return index.source.read(0, index.size)
+    for video in videos:
+        if video.sound is not None:
+            raise InputError(
+                f"{video.path} has a sound, which a page of several files has no place for; take it out (--no-audio)"
+            )
     bitstreams = [replace(shot.bitstream, outline=shot.bitstream.outline or shot.outline()) for shot in shots]
     return b"".join(pack_row(poster_of(shots[0].sequence()), bitstreams, videos[0].fps).data)
 
@@ -224,7 +234,15 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -> ExportReport:
+def page_text(name: str, data: bytes, up: str, view: PageView) -> str:
+    """A page that plays a geometry video.
+
+    Args:
+        name: path of the file, whose stem is the page's title.
+        data: of the file.
+        up: the axis that stands upright in the first view.
+        view: how it opens.
+    """
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
@@ -233,11 +251,21 @@ def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -
         "VIEW": view.attributes(),
         "NOTICE": (shipped / "LICENSES" / "NOTICE.txt").read_text("utf-8").strip(),
         "DIGITS": DIGITS,
-        "PLAYER": _base85(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),
+        "PLAYER": _player(),
         "VIDEO": _base64(data),
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
-    text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
+    return "".join(values[part] if i % 2 else part for i, part in enumerate(parts))
+
+
+@functools.cache
+def _player() -> str:
+    """The player's bundle, as a page holds it."""
+    return _base85(zlib.compress((files("gvpipe.web") / "bundle" / "player.js").read_bytes(), 9))
+
+
+def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -> ExportReport:
+    text = page_text(name, data, up, view).encode()
     with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from changing import SIZES, SPANS, sheet, write_objs
 from file_server import serving
+from folders import SAMPLES
 
 import gvpipe
 from gvpipe.container.mp4 import read_index
@@ -230,6 +231,33 @@ def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"shot 0 \(frames 0 to 2\): "):
         gvpipe.encode(sheets(), tmp_path / "a.mp4", target_bpvf=0.001)
     assert not list(tmp_path.iterdir())
+
+
+def test_sound_of_the_whole_film(run: Run, video: Path, tmp_path: Path) -> None:
+    voice = str(SAMPLES / "voice.wav")
+    report = gvpipe.encode(sheets(), tmp_path / "a.mp4", audio=voice, audio_trim=True)
+    assert report.audio is not None and report.audio["seconds"] == pytest.approx(6 / 25, abs=0.03)
+    found = gvpipe.info(tmp_path / "a.mp4")
+    assert found.audio == report.audio and sum(found.sections.values()) == found.bytes
+    assert found.sections["sound"] == report.sections["sound"] > 0
+    with gvpipe.open_capture(tmp_path / "a.mp4") as opened:
+        assert opened.sound is not None and np.array_equal(opened[4], gvpipe.open_capture(video)[4]) is not None
+        later = opened.capture().part(3, 5).sound
+        assert later is not None and later.seconds == pytest.approx(2 / 25, abs=0.05)
+    ended = run("decode", tmp_path / "a.mp4", tmp_path / "out" / "%d.ply", "--json")
+    assert ended.status == 0 and Path(json.loads(ended.out)["audio"]["output"]).is_file()
+    ended = run("restream", video, tmp_path / "b.mp4", "--audio", voice)
+    assert ended.status == 0 and gvpipe.info(tmp_path / "b.mp4").audio is not None
+    assert np.array_equal(gvpipe.open_capture(tmp_path / "b.mp4")[4], gvpipe.open_capture(video)[4])
+    ended = run("restream", tmp_path / "b.mp4", tmp_path / "c.mp4", "--no-audio")
+    assert ended.status == 0 and (tmp_path / "c.mp4").read_bytes() == video.read_bytes()
+    data, index = (tmp_path / "a.mp4").read_bytes(), read_index(tmp_path / "a.mp4")
+    assert index is not None
+    (tmp_path / "d.mp4").write_bytes(data[:-9] + b"silenced!")
+    with gvpipe.open_capture(tmp_path / "d.mp4") as opened:  # the mesh stays as it is
+        assert opened[4].shape == (49, 3)
+    ended = run("decode", tmp_path / "d.mp4", tmp_path / "out" / "%d.ply")
+    assert ended.status == 0 and "sound is left out" in ended.err.replace("sound of the file", "sound")
 
 
 def test_among_many(run: Run, tmp_path: Path) -> None:

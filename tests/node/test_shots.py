@@ -131,9 +131,10 @@ def changed(path: Path, change: Callable[[dict[str, Any]], None], target: Path) 
     length, begin = 0, at + 24 + len(MAGIC) + 2
     while data[begin] >= 128:
         length, begin = length + 1, begin + 1
-    header = json.loads(zlib.decompress(data[begin + 1 : stop - 4]))
+    header = json.loads(zlib.decompress(data[begin + 1 : stop - 12]))
     change(header)
     packed = MAGIC + VERSION.to_bytes(2, "little") + pack_block(zlib.compress(json.dumps(header).encode()))
+    packed += data[stop - 12 : stop - 4]
     packed += CHECKSUM.pack(zlib.crc32(packed))
     target.write_bytes(data[:at] + uuid_head(SHOTS_UUID, len(packed)) + packed + data[stop:])
     return target
@@ -162,7 +163,7 @@ WRONG = {
     "a huge shot": _set("shots.bytes.0", 1 << 50),
     "a long poster": _set("poster", 1 << 20),
     "another id": _set("id", "0" * 32),
-    "the head": _set("head.1", 0),
+    "companions": _set("companions", [{}] * 9),
     "a hash": _set("shared", {"x" * 32: 10}),
     "shared bytes": lambda header: header["shared"].update({next(iter(header["shared"])): 1}),
     "no shared sections": _set("shared", {}),

@@ -9,9 +9,11 @@
 import { NO_ASSET, readAsset, readCoarseAsset } from "./asset/asset.js";
 import { openCodec } from "./codecs.js";
 import { findIndex, readContainer } from "./format/boxes.js";
+import { describedSound, geometryOf, soundOf } from "./format/companions.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { RepeatedFrames, readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
+import { isRangeSource } from "./format/range_source.js";
 import { Bytes } from "./format/ranges.js";
 import { OUTAGE, closed, request } from "./format/request.js";
 import { readShots } from "./format/shot_layout.js";
@@ -30,6 +32,7 @@ const LATEST = 1000; // while clips come
 const IDLE = 5000; // while none does
 const TRIES = 5; // of a look that the server refuses
 const PATIENCE = 30_000; // ms, with an outage
+const DAMAGED_SOUND = "its sound is damaged, and is left out; get the file again from its source";
 const [LEAST_WORKERS, MOST_WORKERS] = [2, 4]; // that decode shots: one frame of a mesh of its own takes much longer than one of many
 const SHOT_BYTES = 1 << 22; // of decoded frames that a shot keeps, beside those that its capture keeps
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
@@ -38,7 +41,8 @@ export class GeometryVideo {
   /**
    * Load a geometry video, as `gvpipe encode` writes it.
    *
-   * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
+   * @param {string|URL|Blob|ArrayBuffer|Uint8Array|import("./format/range_source.js").RangeSource} source an address, the file itself, or what
+   *   gives parts of it
    * @param {{level?: number|"coarsest", signal?: AbortSignal}} [options] a level of detail above 0 is a coarser mesh, without attributes
    *   and fields; `signal` ends loading
    * @returns {Promise<GeometryVideo>}
@@ -63,14 +67,19 @@ export class GeometryVideo {
     const found = await openSource(source, closing.signal);
     const index = found instanceof Uint8Array ? await shotsOf(found) : found instanceof StreamFile ? null : found;
     const isInParts = !(found instanceof Uint8Array);
-    return index ? GeometryVideo.#openCapture(index, isInParts, level, closing) : GeometryVideo.#open(found, level, closing);
+    if (!index) return GeometryVideo.#open(found, level, closing, { address: source });
+    const video = await GeometryVideo.#openCapture(index, isInParts, level, closing);
+    video.#findSound(isInParts ? null : found, source, { container: index });
+    video.notes = [...video.notes, ...video.#soundNotes];
+    return video;
   }
 
   /**
    * @param {Uint8Array|StreamFile} source of one connectivity
-   * @param {{find?: (hash: string) => Promise<Uint8Array|null>, worker?: DecodingWorker, keptBytes?: number}} [shared] of a shot
+   * @param {{find?: (hash: string) => Promise<Uint8Array|null>, worker?: DecodingWorker, keptBytes?: number, address?: unknown}} [shared]
+   *   of a shot; `address`: of the whole file
    */
-  static async #open(source, level, closing, { find, ...shared } = {}) {
+  static async #open(source, level, closing, { find, address, ...shared } = {}) {
     const parts = source instanceof StreamFile ? source : null;
     const file = parts ? null : source;
     let [pictures, reader] = [null, null];
@@ -78,7 +87,7 @@ export class GeometryVideo {
       closing.signal.throwIfAborted();
       const payload = await readPayload(file ? readContainer(file) : parts.container, find);
       const repeated = readRepeatedFrames(payload);
-      reader = await openCodec(source, payload, repeated, level, closing.signal, shared);
+      reader = await openCodec(file ? geometryOf(file) : source, payload, repeated, level, closing.signal, shared);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
       closing.signal.throwIfAborted();
@@ -89,6 +98,7 @@ export class GeometryVideo {
       video.#isInParts = !file;
       video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
+      if (!find) video.#findSound(file, address, payload.header);
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       if (parts?.isGrowing) video.#watch(parts);
       return video;
@@ -124,7 +134,7 @@ export class GeometryVideo {
       closing.signal.throwIfAborted();
       const { start, frames } = index.shots.at(-1);
       const repeated = new RepeatedFrames(start + frames);
-      const video = new GeometryVideo({ frames: start + frames, fps: index.fps }, index.size, repeated, row, pictures);
+      const video = new GeometryVideo({ frames: start + frames, fps: index.fps, origin: row.origin }, index.size, repeated, row, pictures);
       video.#row = row;
       video.#isInParts = isInParts;
       video.#closeFile = () => closing.abort(closed());
@@ -164,11 +174,18 @@ export class GeometryVideo {
   #queueBeside = Promise.resolve();
   #wake = () => {}; // ends a wait for the next look
   #followers = new Set(); // of a file that is still written
+  #soundNotes = [];
+  #soundUrl = null; // to be revoked
 
   /** The frame that is shown first: 0; of a file that is still written, that where its latest clip begins. */
   startFrame = 0;
   /** The number of the shot that is shown: of the frame that was given last. `vertexCount`, `indices` and what lies beside positions are its own. */
   shot = 0;
+  /**
+   * What is heard with it, or null: `{codec, channels, rate, seconds, start}`, of seconds after frame 0, and `url` of a file that
+   * browsers play.
+   */
+  sound = null;
   /** Called when frames have come to a file that is still written, and when it is finished. */
   grown = () => {};
   /** Called when it cannot be followed any longer, with the error. */
@@ -192,6 +209,8 @@ export class GeometryVideo {
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
+    /** What positions count from, model units: a point of the source. */
+    this.origin = header.origin ?? [0, 0, 0];
     /** Of the whole file. */
     this.byteLength = byteLength;
     this.#repeated = repeated;
@@ -277,15 +296,15 @@ export class GeometryVideo {
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
    * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
    *   nextTick?: (tick: (now: number) => void) => void, ticked?: (now: number, isThere: boolean) => void,
-   *   waits?: (isWaiting: boolean) => void}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames
+   *   waits?: (isWaiting: boolean) => void, clock?: (position: number) => number|null}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames
    *   that are on their way or not yet written, and when it goes on; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
-   *   calls `tick` at its next step, with ms; `ticked` is called at each step, with whether the frame that is due was there
+   *   calls `tick` at its next step, with ms; `clock` may give another position, in frames, in place of what the time makes of it; `ticked` is called at each step, with whether the frame that is due was there
    * @throws {DOMException} NotSupportedError: no browser plays at this rate; AbortError: the video is closed
    */
-  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked, waits } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked, waits, clock } = {}) {
     checkRate(rate);
     await this.#queue;
-    this.#playing = { show, ended, failed, nextTick, ticked, waits, rate, loop };
+    this.#playing = { show, ended, failed, nextTick, ticked, waits, clock, rate, loop };
     await this.#start();
   }
 
@@ -338,6 +357,7 @@ export class GeometryVideo {
     this.#asset?.close();
     this.#reader.close();
     this.#closeFile();
+    if (this.#soundUrl) URL.revokeObjectURL(this.#soundUrl);
   }
 
   /** Look for frames that come, until the end is there: a few times per clip, and seldom while nothing comes. */
@@ -408,6 +428,20 @@ export class GeometryVideo {
     return this.#asset;
   }
 
+  /** What is heard: of a file in memory a file of its own, else the track of the file that the browser fetches. */
+  #findSound(file, source, header) {
+    const described = describedSound(header);
+    if (!described) return;
+    const data = file && soundOf(file, header);
+    if (file && !data) {
+      this.#soundNotes = [DAMAGED_SOUND];
+      return;
+    }
+    let url = file ? null : String(addressOf(source));
+    const makeUrl = () => (this.#soundUrl ??= URL.createObjectURL(new Blob([data], { type: "audio/mp4" })));
+    this.sound = { ...described, get url() { return (url ??= makeUrl()); } };
+  }
+
   #takeAsset(asset) {
     this.indices = asset.indices ?? this.indices;
     /** Named meshes: `{name, vertices: [start, stop], triangles: [start, stop], material, parent}`; [] for one without a name. */
@@ -421,9 +455,11 @@ export class GeometryVideo {
     this.images = asset.images;
     /** (P) corners of each polygon, or null if all are triangles. */
     this.polygons = asset.polygons;
+    /** What lies inside of the surface (`volume/volume.js`), or null. */
+    this.volume = asset.volume;
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
-    this.notes = asset.notes;
+    this.notes = [...asset.notes, ...this.#soundNotes];
   }
 
   /** The positions of frame k of level 0 by pictures of their own, so that what plays goes on. */
@@ -486,7 +522,7 @@ export class GeometryVideo {
 /** @throws {TypeError} it is nothing that can be loaded */
 function checkSource(source) {
   const isText = typeof source === "string" ? source !== "" : source instanceof URL;
-  if (isText || source instanceof Blob || source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return;
+  if (isText || isRangeSource(source) || source instanceof Blob || source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return;
   const found = source === "" ? "empty" : Object.prototype.toString.call(source).slice(8, -1);
   throw new TypeError(`the source is ${found}; an address, a Blob or bytes are needed`);
 }
@@ -498,7 +534,7 @@ function checkSource(source) {
  */
 async function openSource(source, signal) {
   const isAddress = typeof source === "string" || source instanceof URL;
-  const isOnServer = isAddress && /^https?:$/.test(addressOf(source).protocol);
+  const isOnServer = isRangeSource(source) || (isAddress && /^https?:$/.test(addressOf(source).protocol));
   return (isOnServer && (await StreamFile.open(source, signal))) || fetchBytes(source, signal);
 }
 

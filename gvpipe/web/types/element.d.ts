@@ -1,6 +1,6 @@
 /** The element `<geometry-video>`; to import this defines it. */
 
-import type { GeometryVideo, Picked, Shot, Source } from "./geometry-video.js";
+import type { Cut, GeometryVideo, Picked, Shot, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -9,10 +9,16 @@ export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, 
   ready: CustomEvent<null>;
   /** The number of the frame that is shown. */
   frame: CustomEvent<number>;
+  /** Azimuth and elevation, degrees, that a user or `turnTo` turned to. */
+  viewchange: CustomEvent<[number, number]>;
+  /** Names of the parts that are hidden, after a choice in the menu. */
+  partschange: CustomEvent<string[]>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
   /** The number of the shot that is shown, of a capture. */
   shotchange: CustomEvent<number>;
+  /** The cut that is shown, or null. */
+  clip: CustomEvent<Cut | null>;
   /** A point was clicked on. */
   probe: CustomEvent<Probed>;
   /** `detail` is a `GeometryVideoError` if the file or its server is at fault. */
@@ -40,8 +46,10 @@ export class GeometryVideoElement extends HTMLElement {
   readonly currentSrc: string;
   autoplay: boolean;
   loop: boolean;
-  /** Always true: there is no sound. */
+  /** Whether what plays is silent. */
   muted: boolean;
+  /** 0 to 1. */
+  volume: number;
   /** 0.0625 to 16; attribute `speed`. */
   playbackRate: number;
   readonly speed: number;
@@ -78,8 +86,16 @@ export class GeometryVideoElement extends HTMLElement {
   scale: "linear" | "log";
   /** The field that moves vertices, and how far; attribute `warp`, such as "displacement:10". */
   readonly warp: { name: string; scale: number } | null;
+  /** The plane that cuts the mesh; attribute `clip`, such as "x=0.3", "y=30%" or "-x=0.3". */
+  readonly clip: Cut | null;
+  /** (n, 3, 3) corners of the triangles of the cut's section, model units, the file's origin apart; empty where it is hollow. */
+  readonly section: Float32Array;
   /** Azimuth and elevation of the first view, degrees, or null: the player's own; attribute `camera`. */
   readonly camera: [number, number] | null;
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  readonly view: [number, number] | null;
+  /** Turns the camera about its target; degrees. */
+  turnTo(azimuth: number, elevation: number): void;
   readonly hiddenParts: Set<string>;
   /** Hides the parts of these names, and shows all others. */
   hide(names: string | Iterable<string>): void;

@@ -2,7 +2,7 @@
 
 import { AGAIN, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
-import { joined, request } from "./request.js";
+import { joined, nameOf, request } from "./request.js";
 
 const PARTIAL = 206;
 const UNSATISFIABLE = 416;
@@ -19,7 +19,8 @@ export class Ranges {
   received;
 
   /**
-   * @param {string|URL} url @param {AbortSignal} signal ends its requests @param {number} first bytes of the first request
+   * @param {string|URL|import("./range_source.js").RangeSource} url @param {AbortSignal} signal ends its requests
+   * @param {number} first bytes of the first request
    * @returns {Promise<{ranges: Ranges, start: Uint8Array}|null>} the first bytes; null of an empty file
    * @throws {GeometryVideoError} it cannot be fetched
    */
@@ -72,7 +73,7 @@ export class Ranges {
   }
 
   async #read(offset, length, mayEnd, isFresh) {
-    const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
+    const wanted = `bytes ${offset} to ${offset + length - 1} of ${nameOf(this.url)}`;
     if (this.#incoming) {
       const data = await this.#incoming.read(offset, length);
       checkLength(data, length, wanted);
@@ -102,7 +103,7 @@ export class Ranges {
 
   /** The error of a file that has changed. */
   isAnother() {
-    return new GeometryVideoError("corrupt", `${this.url} has another file by now; load the page again`);
+    return new GeometryVideoError("corrupt", `${nameOf(this.url)} has another file by now; load the page again`);
   }
 
   close() {

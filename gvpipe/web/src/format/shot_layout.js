@@ -18,6 +18,7 @@ import {
 import { HASH } from "./bare.js";
 import { CONTAINER_VERSION, newerContainer, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
+import { describedIn } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt, quote } from "./errors.js";
 import { inflate } from "./inflate.js";
@@ -29,6 +30,7 @@ const NAME = "index";
 const BOX_HEAD = 8; // bytes; 16 of long boxes
 const UUID_BYTES = 16;
 const LONGEST_BOX = 2 ** 32;
+const MOST_COMPANIONS = 4;
 const BLANK = { frames: 0, vertices: 0, triangles: 0, bytes: 0 };
 
 /**
@@ -38,7 +40,7 @@ const BLANK = { frames: 0, vertices: 0, triangles: 0, bytes: 0 };
  * @property {number} fps of all shots @property {number} size bytes of the file
  * @property {{start: number, frames: number, vertices: number, triangles: number, bytes: number}[]} shots `start`: the first frame
  * @property {{min: number[], max: number[]}|null} box that first frames stay in, relative to the origin of the first shot
- * @property {Blocks} source of the file's bytes
+ * @property {object[]} companions what it says of tracks beside the video, such as a sound @property {Blocks} source of the file's bytes
  * @property {(number: number) => Window} shot the bytes of a shot's file
  * @property {(hash: string) => Promise<Uint8Array|null>} find a shared section, not checked
  */
@@ -51,12 +53,11 @@ const BLANK = { frames: 0, vertices: 0, triangles: 0, bytes: 0 };
  */
 export async function readShots(source, start, box) {
   const data = box.end <= start.length ? start.subarray(0, box.end) : await source.read(0, box.end);
-  const header = await readHeader(data.subarray(box.start, box.end));
+  const { header, size, checksum } = await readHeader(data.subarray(box.start, box.end));
   const fps = checkNumber(header, "fps", Number.MIN_VALUE, 100_000);
   const shots = readColumns(header);
   const shared = readShared(header);
   const headSize = box.start - BOX_HEAD - UUID_BYTES;
-  const [size, checksum] = numbers(header, "head", 2, 0, 2 ** 32 - 1);
   if (size !== headSize) throw corrupt(NAME, "its place is not behind the description of the video");
   const head = checkHead(data, headSize, checksum);
   const tag = readTag(head);
@@ -79,6 +80,9 @@ export async function readShots(source, start, box) {
     at = offset + bytes;
     return offset;
   });
+  const companions = describedIn({ container: header });
+  if (companions.length > MOST_COMPANIONS) throw corrupt(NAME, `it has ${companions.length} companions`);
+  for (const each of companions) at += BOX_HEAD + integer(each ?? {}, "bytes", 0, MAX_BYTES);
   if (source.size < at) throw new GeometryVideoError("truncated", `it ends ${at - source.size} bytes early; ${AGAIN}`);
   if (source.size > at) throw new GeometryVideoError("corrupt", `${source.size - at} stray bytes follow its last box; ${AGAIN}`);
   const blocks = new Blocks(source, at, start);
@@ -93,10 +97,10 @@ export async function readShots(source, start, box) {
     return kept.get(hash);
   };
   const shot = (number) => new Window(blocks, offsets[number], shots[number].bytes);
-  return { fps, size: at, shots, box: readBox(header), source: blocks, shot, find };
+  return { fps, size: at, shots, box: readBox(header), companions, source: blocks, shot, find };
 }
 
-/** The header of the index. */
+/** The header of the index, and what it says of the boxes before. */
 async function readHeader(data) {
   if (!MAGIC.every((byte, i) => data[i] === byte)) throw new GeometryVideoError("corrupt", `the index does not start with the magic of shots; ${AGAIN}`);
   const content = data.subarray(0, data.length - 4);
@@ -109,6 +113,7 @@ async function readHeader(data) {
     throw cursor.corrupt("its checksum does not match");
   }
   const text = await inflate(cursor.block(), MAX_HEADER, (what) => corrupt(NAME, what));
+  const [size, checksum] = [cursor.u32(), cursor.u32()]; // of the boxes before, without companions
   cursor.end();
   let header;
   try {
@@ -117,7 +122,7 @@ async function readHeader(data) {
     throw corrupt(NAME, "it is not JSON");
   }
   if (!isObject(header) || !isObject(header.shots) || !isObject(header.shared)) throw corrupt(NAME, "it is not as gvpipe writes it");
-  return header;
+  return { header, size, checksum };
 }
 
 function readColumns({ shots: columns }) {

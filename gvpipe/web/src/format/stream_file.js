@@ -11,7 +11,7 @@ import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
 import { clipName, readHeader } from "./payload.js";
 import { Ranges } from "./ranges.js";
-import { joined } from "./request.js";
+import { joined, nameOf } from "./request.js";
 import { readShots } from "./shot_layout.js";
 import { checkHead, readIndex } from "./stream_layout.js";
 
@@ -19,6 +19,7 @@ const FIRST = 1 << 16; // bytes of the first request
 const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas|clip)\.(\d+)$/;
 const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
+const OF_COMPANIONS = /^companion\./; // which the browser fetches
 const FIRST_LIVE = 1 << 17; // bytes of the second request, of a file that is still written
 const ROWS = 64; // of the table of clips, asked for at once
 const LOOK_AGAIN = 500; // ms between looks for a first clip
@@ -26,7 +27,7 @@ const LOOKS = 120;
 
 export class StreamFile {
   /**
-   * @param {string|URL} url @param {AbortSignal} signal ends its requests
+   * @param {string|URL|import("./range_source.js").RangeSource} url @param {AbortSignal} signal ends its requests
    * @returns {Promise<StreamFile|import("./shot_layout.js").ShotIndex|Uint8Array|null>} the whole file where it has the plain layout, where
    *   nothing belongs to segments, and of pictures where there is no WebCodecs; null where the server refuses a part
    * @throws {GeometryVideoError} it cannot be fetched, or the index is damaged
@@ -71,14 +72,14 @@ export class StreamFile {
     const { url } = ranges;
     if (!ranges.isPartial) {
       ranges.close();
-      throw new GeometryVideoError("load", `${url} is still written, and its server knows no Range; try again when it is finished`);
+      throw new GeometryVideoError("load", `${nameOf(url)} is still written, and its server knows no Range; try again when it is finished`);
     }
     const file = new StreamFile(ranges);
     for (let i = 0; i < LOOKS; i++) {
       if (await file.#beginLive(place)) return file;
       await new Promise((resolve) => setTimeout(resolve, LOOK_AGAIN));
     }
-    throw new GeometryVideoError("load", `${url} is still written, and nothing comes; try again`);
+    throw new GeometryVideoError("load", `${nameOf(ranges.url)} is still written, and nothing comes; try again`);
   }
 
   /** @param {import("./ranges.js").Ranges|import("./ranges.js").Window} source of its bytes */
@@ -215,7 +216,7 @@ export class StreamFile {
       const number = OF_SEGMENTS.exec(name)?.[2];
       if (number) this.segments.set(number, [...(this.segments.get(number) ?? []), name]);
     }
-    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name) && !OF_FIELDS.test(name));
+    const shared = entries.filter(({ name }) => ![OF_SEGMENTS, OF_FIELDS, OF_COMPANIONS].some((kind) => kind.test(name)));
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);

@@ -10,6 +10,7 @@ import {
   BITSTREAM_VERSION as VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
+import { withoutCompanions } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 
@@ -45,9 +46,9 @@ export function readStream(file, box) {
   return { sections, videoChecksum };
 }
 
-/** The boxes `ftyp` and `moov`, at the start of a file. */
+/** The boxes `ftyp` and `moov`, at the start of a file, without companions. */
 export function checkHead(file, size, checksum) {
-  const head = take(file, 0, size);
+  const head = withoutCompanions(take(file, 0, size));
   if (crc32(head) !== checksum) {
     throw new GeometryVideoError("corrupt", `the description of its video is damaged; ${AGAIN}`);
   }

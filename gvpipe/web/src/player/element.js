@@ -5,19 +5,23 @@
  * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
  * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours),
  * `scale` ("log": colours follow the logarithm), `warp` ("name:scale" of a field that moves vertices), `camera`
- * ("azimuth,elevation" of the first view, degrees), `shading` ("flat": each triangle has one normal),
- * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up).
+ * ("azimuth,elevation" of the first view, degrees), `clip` ("x=0.3", "y=30%" or "-x=0.3": a plane that cuts the mesh), `shading` ("flat": each triangle has one normal),
+ * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up), `muted`, `volume` (0 to 1).
+ * Frames follow the sound's clock while it is heard. Browsers let a page play on its own only if it is `muted`.
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number), `levelchange` (detail: the level of detail that is shown), `shotchange` (detail: the number of the shot that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
+ * the frame's number), `viewchange` (detail: azimuth and elevation that a user turned to), `partschange` (detail: names of
+ * hidden parts), `levelchange` (detail: the level of detail that is shown), `shotchange` (detail: the number of the shot that is shown),
+ * `probe` (detail: what was clicked on), `clip` (detail: the cut that is shown, or null); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
-import { checkSeconds, paused } from "../playback.js";
+import { checkSeconds, checkVolume, paused } from "../playback.js";
 import { FASTEST, SLOWEST, checkRate } from "../playback_rate.js";
 import { COLORMAPS } from "../three/colormaps.js";
 import { isLogarithmic } from "../three/field_colours.js";
 import { parseWarp, usualMover } from "../three/warp.js";
+import { cutText, parseCut } from "../volume/plane.js";
 import { Bar, nextSpeed } from "./bar.js";
 import { listenToClicks } from "./clicks.js";
 import { embedded } from "./embedded.js";
@@ -46,16 +50,18 @@ const ZOOM = 1.15;
 const LOST = "The browser took the picture's WebGL away, as it does when a page has many: remove some.";
 const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTMLMediaElement
 const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "waiting", "ended", "ratechange"];
+const SOUND_ATTRIBUTES = ["muted", "volume"];
 
 const FIELD_ATTRIBUTES = ["field", "colormap", "range", "scale"];
-const VIEW_ATTRIBUTES = ["warp", "camera", "shading"];
+const VIEW_ATTRIBUTES = ["warp", "clip", "camera", "shading"];
+const HOLLOW = "the cut is hollow: the file has no volume (gvpipe encode --volume)";
 const MOST_SHARE = 0.25; // of the diagonal, that the slider's end moves vertices by
 
 /** Where there are no pages, modules that name the element can still be loaded. */
 const Base = globalThis.HTMLElement ?? class {};
 
 export class GeometryVideoElement extends Base {
-  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "lod", ...FIELD_ATTRIBUTES, ...VIEW_ATTRIBUTES];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "lod", ...SOUND_ATTRIBUTES, ...FIELD_ATTRIBUTES, ...VIEW_ATTRIBUTES];
 
   #stage = null;
   #bar;
@@ -65,6 +71,7 @@ export class GeometryVideoElement extends Base {
   #probe;
   #loading = null; // Load
   #loaded = null; // promise, while a file is loaded
+  #given = null; // what was loaded last, as it was given
   #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
   #isReady = false; // whether a file is loaded, and said to be
   #giveUps = new Set(); // reject what waits for that to play
@@ -73,6 +80,7 @@ export class GeometryVideoElement extends Base {
   #sought = null; // a promise that it is shown
   #resume = false; // whether to play on when the slider is let go
   #showing = null; // counts changes of the field
+  #cutting = null; // and of the cut
   #hidden = new Set(); // names of parts
 
   /** The `GeometryVideo` that is shown, or null. */
@@ -98,7 +106,11 @@ export class GeometryVideoElement extends Base {
       field: (name) => (name ? this.setAttribute("field", name) : this.removeAttribute("field")),
       colormap: (name) => this.setAttribute("colormap", name),
       warp: (name, scale) => this.setAttribute("warp", `${name}:${scale}`),
-      hide: (names) => this.hide(names),
+      clip: (change) => this.#changeClip(change),
+      hide: (names) => {
+        this.hide(names);
+        this.#tell("partschange", [...names]);
+      },
     });
     this.#legend = new Legend(root.querySelector(".legend"));
     this.#probe = new Probe(root.querySelector(".probe"), (vertex) => this.#stage?.setMark(vertex));
@@ -110,7 +122,8 @@ export class GeometryVideoElement extends Base {
   }
 
   connectedCallback() {
-    if (this.hasAttribute("src") && !this.#loaded) this.load(this.getAttribute("src"));
+    const source = this.#given ?? this.getAttribute("src");
+    if (source !== null && !this.#loaded) this.load(source); // anew, where it was taken out of the page
   }
 
   disconnectedCallback() {
@@ -133,7 +146,8 @@ export class GeometryVideoElement extends Base {
   }
 
   attributeChangedCallback(name, before, value) {
-    if (name === "src" && this.isConnected && value !== null && (before !== value || this.error)) this.load(value);
+    if (name === "src" && !this.isConnected) this.#given = null;
+    else if (name === "src" && value !== null && (before !== value || this.error)) this.load(value);
     if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
@@ -142,6 +156,8 @@ export class GeometryVideoElement extends Base {
     if (FIELD_ATTRIBUTES.includes(name) && before !== value && this.#mesh) this.#showField();
     if (VIEW_ATTRIBUTES.includes(name) && before !== value && this.#mesh) this.#showView(name);
     if (name === "loop" && this.#mesh) this.#mesh.loop = this.loop;
+    if (name === "muted") this.#bar.setMuted(value !== null);
+    if (SOUND_ATTRIBUTES.includes(name) && before !== value) this.#setSound();
     if (name === "speed" && this.#mesh) this.#mesh.playbackRate = this.speed;
     else if (name === "speed" && before !== value) this.#tell("ratechange");
   }
@@ -189,12 +205,35 @@ export class GeometryVideoElement extends Base {
     this.setAttribute("speed", checkRate(rate));
   }
 
-  /** Always true: there is no sound. To set it changes nothing, so that scripts for `<video>` run. */
+  /** Whether what plays is silent; attribute `muted`. */
   get muted() {
-    return true;
+    return this.hasAttribute("muted");
   }
 
-  set muted(_) {}
+  set muted(muted) {
+    this.toggleAttribute("muted", Boolean(muted));
+  }
+
+  /** 0 to 1; attribute `volume`. */
+  get volume() {
+    const text = this.getAttribute("volume") ?? "";
+    const volume = text.trim() ? Number(text) : 1;
+    return volume >= 0 && volume <= 1 ? volume : 1;
+  }
+
+  set volume(volume) {
+    this.setAttribute("volume", checkVolume(volume));
+  }
+
+  /** Have the mesh as muted and as loud as the attributes say. */
+  #setSound() {
+    if (this.#mesh) {
+      this.#mesh.volume = this.volume;
+      this.#mesh.muted = this.muted;
+    } else {
+      this.#tell("volumechange");
+    }
+  }
 
   /** The frame shown. */
   get currentFrame() {
@@ -291,6 +330,26 @@ export class GeometryVideoElement extends Base {
     return numbers.length === 2 && numbers.every(Number.isFinite) && Math.abs(numbers[1]) <= 90 ? numbers : null;
   }
 
+  /** The plane of attribute `clip` (`volume/plane.js`), or null. */
+  get clip() {
+    return parseCut(this.getAttribute("clip"));
+  }
+
+  /** (n, 3, 3) corners of the triangles of the cut's section, model units, the file's origin apart; empty where it is hollow. */
+  get section() {
+    return this.#mesh?.section ?? new Float32Array(0);
+  }
+
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  get view() {
+    return this.#mesh ? this.#stage.angles : null;
+  }
+
+  /** Turn the camera about the middle of the picture. @param {number} azimuth @param {number} elevation degrees */
+  turnTo(azimuth, elevation) {
+    if (this.#mesh) this.#stage.turnTo([azimuth, elevation]);
+  }
+
   /** Names of the parts that are hidden. */
   get hiddenParts() {
     return new Set(this.#hidden);
@@ -312,6 +371,7 @@ export class GeometryVideoElement extends Base {
   /** Load and show a file: an address, `#id`, or the file itself; without one, `src` anew. Errors are shown in the element. */
   load(source = this.src) {
     this.#unload();
+    this.#given = source;
     this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
     let end;
     this.#loaded = new Promise((resolve) => (end = resolve)); // there before any listener is told
@@ -348,6 +408,7 @@ export class GeometryVideoElement extends Base {
       this.#openMesh();
       await load.step(breathe());
       await load.step(Promise.all([this.#showField(), this.#showWarp()]));
+      this.#showClip(); // what lies inside may come later
       this.#becomeReady(load);
     } catch (error) {
       loaded?.then((late) => late.close(), () => {});
@@ -382,7 +443,10 @@ export class GeometryVideoElement extends Base {
     const canvas = this.shadowRoot.querySelector("canvas");
     canvas.addEventListener("webglcontextlost", () => this.#stage?.hasMesh && this.#say(LOST, "alert"));
     canvas.addEventListener("webglcontextrestored", () => this.#say(""));
-    return openStage(canvas);
+    const stage = openStage(canvas);
+    stage.cutMoved = (place) => this.#changeClip({ place });
+    stage.turned = () => this.#tell("viewchange", stage.angles);
+    return stage;
   }
 
   #openMesh() {
@@ -392,6 +456,12 @@ export class GeometryVideoElement extends Base {
     this.#showView("shading");
     mesh.loop = this.loop;
     mesh.playbackRate = this.speed;
+    this.#setSound();
+    mesh.addEventListener("volumechange", () => {
+      if (mesh.muted !== this.muted) this.muted = mesh.muted; // the browser refused to play it
+      this.#tell("volumechange");
+    });
+    mesh.addEventListener("notes", () => this.#bar.setNotes(mesh.notes));
     if (this.lod !== mesh.lod) mesh.lod = this.lod;
     for (const name of MEDIA_EVENTS) mesh.addEventListener(name, () => this.#tell(name));
     for (const name of ["play", "pause"]) {
@@ -412,6 +482,7 @@ export class GeometryVideoElement extends Base {
       if (level === 0) {
         this.#showField();
         this.#showWarp();
+        this.#showClip();
       }
       this.#tell("levelchange", level);
     });
@@ -539,7 +610,42 @@ export class GeometryVideoElement extends Base {
   #showView(name) {
     if (name === "camera") this.#stage.setView(this.camera);
     else if (name === "shading") this.#stage.setFlatShading(this.getAttribute("shading") === "flat");
+    else if (name === "clip") this.#showClip();
     else this.#showWarp();
+  }
+
+  /** Cut the mesh by the plane of attribute `clip`, if it is one: a promise that the section is shown. */
+  async #showClip() {
+    const { video, clip } = this;
+    if (!this.#mesh || (!clip && !this.#mesh.cut)) return;
+    const showing = (this.#cutting = {});
+    const isFirst = clip && video.volume && !video.volume.grid;
+    if (isFirst) this.#say("Decoding what lies inside …");
+    try {
+      const cutting = this.#stage.setClip(clip);
+      this.#panel.setClip(this.#stage.cutRange);
+      this.#bar.setNotes([...this.#mesh.notes, ...(clip && !video.volume && !video.level ? [HOLLOW] : [])]);
+      if (!(await cutting) || showing !== this.#cutting) return;
+      this.#tell("clip", clip);
+    } catch (error) {
+      if (video === this.video) this.#interrupt(error);
+      return;
+    }
+    if (isFirst && showing === this.#cutting) this.#say("");
+  }
+
+  #changeClip({ axis, place, turn }) {
+    const cut = this.#stage.cutRange;
+    if (axis === null) {
+      this.removeAttribute("clip");
+    } else if (axis !== undefined) {
+      const { min, max } = this.#mesh.bounds;
+      const middle = (min[axis] + max[axis]) / 2 + this.video.origin[axis];
+      this.setAttribute("clip", cutText({ axis, place: middle, isPart: false, sign: this.clip?.sign ?? 1 }));
+    } else if (cut) {
+      const sign = turn ? -this.clip.sign : this.clip.sign;
+      this.setAttribute("clip", cutText({ axis: cut.axis, place: place ?? cut.place, isPart: false, sign }));
+    }
   }
 
   /** Move vertices by the field of attribute `warp`, if the video has it; offer what else can move them. */
@@ -606,6 +712,7 @@ export class GeometryVideoElement extends Base {
       last: () => this.seek(this.video.frameCount - 1),
       slower: () => this.setAttribute("speed", nextSpeed(this.speed, -1)),
       faster: () => this.setAttribute("speed", nextSpeed(this.speed, 1)),
+      mute: () => this.toggleAttribute("muted"),
       loop: () => this.toggleAttribute("loop"),
       wireframe: () => this.toggleAttribute("wireframe"),
       follow: () => this.toggleAttribute("follow"),
@@ -665,7 +772,7 @@ export class GeometryVideoElement extends Base {
     this.#loaded = null;
     this.#loading?.end();
     this.#loading = null;
-    this.#showing = null;
+    this.#showing = this.#cutting = null;
     this.video?.close();
     this.video = null;
     this.error = null;

@@ -62,6 +62,11 @@ export class ShotRow {
     this.#bounds = structuredClone(index.box ?? EMPTY);
   }
 
+  /** Of the first shot, which positions of all are relative to. */
+  get origin() {
+    return this.#origin;
+  }
+
   /** As `ShotIndex.shots`. */
   get shots() {
     return this.#index.shots;
