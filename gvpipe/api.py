@@ -509,22 +509,28 @@ def open_capture(path: StrPath, *, unlimited: bool = False) -> CapturePlayer:
 
 
 def compare(
-    reference: MeshSequence | Player | Source,
-    distorted: MeshSequence | Player | Source,
+    reference: MeshSequence | Capture | Player | CapturePlayer | Source,
+    distorted: MeshSequence | Capture | Player | CapturePlayer | Source,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    surface: bool | None = None,
 ) -> Comparison:
-    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+    """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
     Args:
-        reference: the original, a player, or what `read` takes; lengths are divided by its size. Where one of both has a
-            volume, the other is read with what lies inside of it.
-        distorted: as many frames and vertices, the same triangles in any order; or what `read` takes, such as a geometry video.
+        reference: the original, a capture, a player, or what `read` takes; lengths are divided by its size. Where one of both
+            has a volume, the other is read with what lies inside of it.
+        distorted: as many frames, of the same vertices and triangles in any order, or of others; or what `read` takes, such as
+            a geometry video.
         progress: called with (frames done, frames in all) after each block.
+        surface: True: the distance of the surfaces too, whose triangles need not correspond; False: never; None: where vertices
+            do not correspond. Of captures, surfaces are compared.
 
     Raises:
-        InputError: one cannot be read, or the two differ in their number of frames or vertices or in their triangles, so that
-            vertices do not correspond.
-        TypeError: one of them is neither a sequence, a player nor a path.
+        InputError: one cannot be read, they differ in their number of frames, vertices do not correspond and ``surface`` is
+            False, or surfaces are needed and one side has no triangles.
+        TopologyChange: vertices or triangles of one change, and ``surface`` is False.
+        TypeError: one of them is neither a sequence, a capture, a player nor a path.
 
     Examples:
         >>> import numpy as np
@@ -536,16 +542,34 @@ def compare(
         (0.5, 0.1)
     """
     from gvpipe.metrics.comparison import compare as measure
+    from gvpipe.metrics.comparison import compare_captures
 
     given = {"reference": reference, "distorted": distorted}
     for role, one in given.items():
-        if not isinstance(one, MeshSequence | Player | str | os.PathLike | list | tuple):
+        if not isinstance(one, MeshSequence | Capture | Player | CapturePlayer | str | os.PathLike | list | tuple):
             raise TypeError(f"compare's {role} is {show(one)}; a MeshSequence, a Player or a path is needed")
-    both = [_as_sequence(one) for one in given.values()]
-    if any(each.volume is not None for each in both):
-        pairs = zip(given.values(), both, strict=True)
-        both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-    return measure(both[0], both[1], progress).of(reference, distorted)
+    if isinstance(reference, Capture | CapturePlayer) or isinstance(distorted, Capture | CapturePlayer):
+        return compare_captures(_as_capture(reference), _as_capture(distorted), progress)
+    try:
+        both = [_as_sequence(one) for one in (reference, distorted)]
+        if any(each.volume is not None for each in both):
+            pairs = zip((reference, distorted), both, strict=True)
+            both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
+        return measure(both[0], both[1], progress, surface=surface).of(reference, distorted)
+    except TopologyChange:
+        if surface is False:
+            raise
+        return compare_captures(_as_capture(reference), _as_capture(distorted), progress)
+
+
+def _as_capture(given: MeshSequence | Capture | Player | CapturePlayer | Source) -> Capture:
+    if isinstance(given, Capture):
+        return given
+    if isinstance(given, CapturePlayer):
+        return given.capture()
+    if isinstance(given, MeshSequence | Player):
+        return Capture([_as_sequence(given)])
+    return read_capture(given)
 
 
 def _as_sequence(given: MeshSequence | Player | Source, volume: bool = False) -> MeshSequence:

@@ -468,6 +468,7 @@ def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -
 @click.option("--mesh", metavar="FILE", help="The triangles of point caches (.pc2, .mdd, .npy), of either side.")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1, of DISTORTED too unless it holds just as many.")
 @click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
+@click.option("--surface", is_flag=True, help="The distance of the surfaces, too. [default: where vertices do not correspond]")
 @unlimited_option
 @output_options
 def compare(
@@ -478,10 +479,14 @@ def compare(
     mesh: str | None,
     frames: str | None,
     fps: float | None,
+    surface: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
-    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
+    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input.
+
+    Where their vertices do not correspond, surfaces are compared: the distance of each from the other.
+    """
     from gvpipe.cli.choices import parse_frames
     from gvpipe.metrics import comparison
     from gvpipe.playback import files
@@ -493,27 +498,44 @@ def compare(
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         read_given = partial(files.read, one, fps, clip, its_mesh, span, unlimited=unlimited)
         read_other = partial(files.read, other, None, other_clip, other_mesh, unlimited=unlimited)
-        given = read_given()
-        compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-        if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
-            read_other = partial(read_other, volume=True)
-            given = given if given.volume is not None else read_given(volume=True)
+
+        def show_progress(done: int, of: int) -> None:
+            if progress:
+                progress("compare", done / of)
+
+        try:
+            given = read_given()
             compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-        result = comparison.compare(
-            given,
-            compared,
-            lambda done, of: progress("compare", done / of) if progress else None,
-        )
+            if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
+                read_other = partial(read_other, volume=True)
+                given = given if given.volume is not None else read_given(volume=True)
+                compared = read_other() if span is None else _same_frames(read_other, span, len(given))
+            result = comparison.compare(given, compared, show_progress, surface=surface or None)
+        except TopologyChange:
+            capture = files.read_capture(one, fps, clip, its_mesh, span, unlimited=unlimited)
+            whole = files.read_capture(other, None, other_clip, other_mesh, unlimited=unlimited)
+            part = whole if span is None or len(whole) == len(capture) else whole.part(*span)
+            result = comparison.compare_captures(capture, part, show_progress)
     values = result.to_json()
     out.json(values)
-    for name, value in values.items():
-        if name not in ("frames", "attributes", "fields", "volume"):
-            out.text(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
+    if result.unpaired:
+        out.note(f"surfaces alone are compared: {result.unpaired}")
+    else:
+        _print_numbers(out, {name: value for name, value in values.items() if name != "surface"})
+    if result.surface is not None:
+        _print_numbers(out, result.surface.to_json(), "surface ")
     for kind, errors in (("attribute", result.attributes), ("field", result.fields), ("inside", result.volume)):
         for name, error in errors.items():
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+def _print_numbers(out: Output, values: dict[str, Any], prefix: str = "") -> None:
+    """A line for each number, by its name."""
+    for name, value in values.items():
+        if value is None or isinstance(value, int | float):
+            out.text(f"{prefix + name:<{14 + len(prefix)}} {'not defined' if value is None else format(value, '.6g')}")
 
 
 def _meshes(paths: tuple[str, str], mesh: str | None) -> list[str | None]:

@@ -17,6 +17,11 @@ SHOWN = {
     "sted": "STED error",
     "hausdorff": "Hausdorff distance, model units",
 }
+OF_SURFACES = {
+    "rms_diag": "root mean square distance of the surfaces, % of the diagonal",
+    "p99_diag": "99 % of distances are below, % of the diagonal",
+    "max_diag": "largest distance, % of the diagonal",
+}
 
 
 def comparison_html(numbers: Mapping[str, Any]) -> str:
@@ -26,12 +31,18 @@ def comparison_html(numbers: Mapping[str, Any]) -> str:
         value = numbers[name]
         if value is not None:
             rows.append((words, f"{100 * value if name in PERCENT else value:.4g}"))
+    surface = numbers.get("surface")
+    if surface:
+        rows += [(words, f"{100 * surface[name]:.4g}") for name, words in OF_SURFACES.items() if surface[name] is not None]
     for kind in ("attributes", "fields", "volume"):
         for name, errors in numbers[kind].items():
             rows.append((f"{name}: largest error", f"{errors['max']:.4g}" if errors.get("max") is not None else "none"))
     cell = '<td style="text-align: left">{}</td>'
     table = "".join(f"<tr>{cell.format(html.escape(words))}{cell.format(value)}</tr>" for words, value in rows)
-    plot = _plot(numbers["frames"])
+    frames = numbers["frames"]
+    if surface and not frames:  # vertices do not correspond
+        frames = [{"max": frame["max"], "rmse": frame["rms"]} for frame in surface["frames"]]
+    plot = _plot(frames)
     return f"<div><table>{table}</table>{plot}</div>"
 
 
