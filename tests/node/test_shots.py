@@ -122,6 +122,26 @@ def test_frames_play_in_a_row(node: Ask, video: Path) -> None:
     assert sorted(set(shown["frames"])) == list(range(6)) and shown["ended"] <= 1
 
 
+def test_few_shots_stay_open(node: Ask) -> None:
+    """Of large shots eight; those used longest ago are closed, and their frames let go of."""
+    order = [*range(0, 40, 2), 1, 39]
+    found = node("row", shots=20, vertices=100_000, together=2, frames=order)
+    assert found["seen"] == [[k // 2, k % 2, 0] for k in order]
+    assert found["opened"] == [*range(20), 0] and found["closed"][:12] == list(range(12))
+    assert found["kept"] <= 2 * 8
+    found = node("row", shots=20, vertices=1000, together=2, frames=order)
+    assert found["opened"] == list(range(20)) and not set(found["closed"][:-20])
+
+
+def test_shots_are_opened_ahead(node: Ask) -> None:
+    """While it plays: in order, few at once, and again behind the last."""
+    found = node("row", shots=20, vertices=100_000, together=2, frames=[0], plays=60)
+    steps = np.diff(found["seen"][1:]) % 40
+    assert steps.min() >= 1 and steps.max() <= 3 and found["most"] <= 2
+    assert found["opened"][:20] == list(range(20)) and found["opened"][20:24] == [0, 1, 2, 3]
+    assert len(found["closed"]) >= len(found["opened"]) - 1
+
+
 def changed(path: Path, change: Callable[[dict[str, Any]], None], target: Path) -> Path:
     """The same file with another index, whose checksum is right."""
     data, index = path.read_bytes(), read_index(path)
