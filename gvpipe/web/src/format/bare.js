@@ -14,8 +14,8 @@ import { newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
+import { checkHeader, checkInteger, isObject } from "./header.js";
 import { inflateRaw } from "./inflate.js";
-import { checkHeader, checkInteger, isObject } from "./payload.js";
 import { sha256 } from "./sha256.js";
 
 const NAME = new RegExp(`^[a-z0-9.]{1,${MAX_NAME}}$`);

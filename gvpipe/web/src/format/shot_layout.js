@@ -21,8 +21,8 @@ import { crc32 } from "./checksum.js";
 import { describedIn } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt, quote } from "./errors.js";
+import { checkNumber, isObject, parseJson } from "./header.js";
 import { inflate } from "./inflate.js";
-import { checkNumber, isObject } from "./payload.js";
 import { Blocks, Window } from "./ranges.js";
 import { checkHead } from "./stream_layout.js";
 
@@ -115,12 +115,7 @@ async function readHeader(data) {
   const text = await inflate(cursor.block(), MAX_HEADER, (what) => corrupt(NAME, what));
   const [size, checksum] = [cursor.u32(), cursor.u32()]; // of the boxes before, without companions
   cursor.end();
-  let header;
-  try {
-    header = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(text));
-  } catch {
-    throw corrupt(NAME, "it is not JSON");
-  }
+  const header = parseJson(text, (what) => corrupt(NAME, what));
   if (!isObject(header) || !isObject(header.shots) || !isObject(header.shared)) throw corrupt(NAME, "it is not as gvpipe writes it");
   return { header, size, checksum };
 }

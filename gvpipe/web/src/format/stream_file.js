@@ -9,7 +9,7 @@ import { findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
-import { clipName, readHeader } from "./payload.js";
+import { clipName, readHeader } from "./header.js";
 import { Ranges } from "./ranges.js";
 import { joined, nameOf } from "./request.js";
 import { readShots } from "./shot_layout.js";
