@@ -10,10 +10,9 @@ from typing import Any
 
 import browsers
 import numpy as np
-import numpy.typing as npt
 import pytest
 from folders import DOCS
-from pages import LOAD, encode_file, flipped, run
+from pages import LOAD, PAINTED, encode_file, flipped, run, silhouette
 from PIL import Image
 from sequences import waving
 
@@ -22,19 +21,6 @@ import gvpipe
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 slow = pytest.mark.slow  # the default run has one test of exact positions and one of the player
 PLAYER_PAGE = (DOCS / "player.md").read_text("utf-8")
-Mask = npt.NDArray[np.bool_]
-PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
-
-
-def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], size: tuple[int, int]) -> Mask:
-    """Which pixels of a picture triangles cover, by the CPU renderer; ``points (V, 2)`` in pixels."""
-    width, height = size
-    flat = np.column_stack([points[:, 0], height - points[:, 1], np.zeros(len(points))]).astype(np.float32)
-    field = 28.0  # degrees; at this distance a unit is a pixel
-    distance = height / 2 / np.tan(np.radians(field) / 2)
-    camera = gvpipe.Camera((width / 2, height / 2, 0.0), distance, azimuth=0.0, elevation=0.0, field_of_view=field)
-    mask: Mask = gvpipe.Renderer(faces, flat, size, samples=1).visible(flat, camera) >= 0
-    return mask
 
 
 @slow

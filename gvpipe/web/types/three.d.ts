@@ -42,6 +42,8 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   frame: { frame: number };
   /** Another level of detail is shown; geometry and materials are new. */
   levelchange: { level: number };
+  /** Another shot of a capture is shown; geometry and materials are new. */
+  shotchange: { shot: number };
   /** Late values of a field, or textures, have come: the scene is to be drawn anew. */
   change: {};
   error: { error: Error };
@@ -123,6 +125,8 @@ export class GeometryVideoMesh extends MeshOfVideo {
       scale?: "linear" | "log";
     },
   ): Promise<[number, number] | null>;
+  /** Values of the first and the last colour of the field that is shown. */
+  readonly fieldRange: [number, number];
   /** A mesh that shares geometry and materials, and so moves with this one. */
   clone(recursive?: boolean): Mesh;
   /** Frees the video, and what the GPU has of it. */
