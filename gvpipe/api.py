@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
+from gvpipe.asset_coding.moving_textures import MovingCoding
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
@@ -31,7 +32,7 @@ from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.model.warp import warped
-from gvpipe.playback.files import Source, frame_range, read
+from gvpipe.playback.files import Source, add_texture, frame_range, read
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
@@ -158,6 +159,9 @@ def encode(
     real_time: bool = False,
     warp: str | None = None,
     volume: bool = False,
+    texture: StrPath | None = None,
+    texture_quality: float | None = None,
+    texture_codec: str | None = None,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -184,7 +188,10 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp, volume: as for `read`. The volume of a sequence is always coded.
+        clip, mesh, frames, unlimited, real_time, warp, volume, texture: as for `read`. The volume of a sequence is always coded.
+        texture_quality: of textures with a picture for each frame, 0..100, higher is better; None: 75.
+        texture_codec: of these: ``"h264"``, which all browsers play, ``"hevc"``, ``"av1"``, or ``"copy"`` for the pictures of a
+            video as they are coded. None: ``"copy"`` for a video of H.264 where no quality is given, else ``"h264"``.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
@@ -208,16 +215,18 @@ def encode(
         workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
     if scheduler is not None or not (workers is None or is_shared):
         check_mapped(given)
+    moving = MovingCoding(texture_codec, texture_quality)
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = _StageClock(progress)
     with open_executor(scheduler, workers) as executor:
         options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited, "real_time": real_time, "warp": warp}
         options["volume"] = volume
         sequence = _open_source(source, path, fps, options)
+        sequence = sequence if texture is None else add_texture(sequence, texture, frames)
         if memory is not None:
             given = fit_segments(given, sequence.n_vertices, memory)
         target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
-        asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures))
+        asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures, moving))
         with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
             coded = _code(sequence, given, target, asset, bare, clock)
     size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
@@ -263,7 +272,8 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     else:  # positions before faces: the video decodes on other threads while the mesh does on this one
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
-    return dataclasses.replace(whole, positions=positions, fields=fields)
+    images = tuple(image.part(start, stop) for image in whole.images)
+    return dataclasses.replace(whole, positions=positions, fields=fields, images=images)
 
 
 def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlimited: bool = False) -> Restreamed:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.listing import count_polygons
-from gvpipe.asset.material import Image, image_size
+from gvpipe.asset.material import Image
 from gvpipe.asset.metadata import NO_METADATA, Metadata, with_losses
 from gvpipe.asset.part import Part
 from gvpipe.asset.texts import Cleaner
@@ -34,6 +34,8 @@ from gvpipe.asset_coding.directory import (
     vertex_starts,
 )
 from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
+from gvpipe.asset_coding.moving_textures import KIND as MOVING_KIND
+from gvpipe.asset_coding.moving_textures import code_moving
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
@@ -49,6 +51,7 @@ from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_
 from gvpipe.coding.codec import Codec, Encoded, FrameReader
 from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.companion import Companion
 from gvpipe.container.outline import Outline
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
@@ -56,6 +59,7 @@ from gvpipe.fields.octahedral import angular_bound, to_octahedral
 from gvpipe.fields.values import FieldBound
 from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.runtime.forks import kept
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 
@@ -89,7 +93,7 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     check_names(options.attributes, sequence.attributes, "attribute")
     check_names(options.fields, sequence.fields, "field")
     images = tuple(limit_image(image, options.textures) for image in sequence.images)
-    texels = max((max(image_size(image.data) or (0,)) for image in images), default=0)
+    texels = max((max(image.size or (0,)) for image in images), default=0)
     attributes, fields, left_out, whole = {}, {}, [], []
     for name, attribute in sequence.attributes.items():
         values = attribute.values
@@ -143,6 +147,7 @@ class AssetCoder:
     def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
         self._sequence = sequence
         options = _by_what_they_are(options, sequence)
+        self._options = options
         self.plan = plan_asset(sequence, options)
         volume = sequence.volume
         kept = {**self.plan.attributes, **self.plan.fields}
@@ -186,13 +191,15 @@ class AssetCoder:
             shown = Shown(permutation, reader, arrangement.faces, arrangement.polygons)
             reorder = bool(getattr(codec, "reorder", False))
             sections |= self._volume.sections(shown, sum(map(len, sections.values())), reorder, is_final)
+        others = tuple(each for each in encoded.bitstream.companions if each.kind != MOVING_KIND)
         metadata = _with_losses(self._sequence)
         if len(metadata.times) == encoded.bitstream.n_frames:
             sections[TIMES] = pack_times(metadata.times)
         images = []
         for number, image in enumerate(self.plan.images):
-            images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
-            sections[images[-1].section] = image.data
+            images.append(ListedImage(image.name, image.media_type, "" if image.is_moving else f"image.{number}"))
+            if not image.is_moving:
+                sections[images[-1].section] = image.data
         directory = Directory(
             parts=parts,
             geometry=same_bits,
@@ -206,7 +213,13 @@ class AssetCoder:
             encoded.bitstream,
             sections={**sections, SECTION: pack_directory(directory, len(permutation))},
             outline=_with_counts(encoded.bitstream.outline, arrangement, len(parts)),
+            companions=(*others, *self._moving),
         )
+
+    @kept
+    def _moving(self) -> tuple[Companion, ...]:
+        """Tracks of moving images, the same for all bitstreams."""
+        return code_moving(self.plan.images, self._sequence, self._options.moving)
 
     def _arrange(self, decoded: Int32, place: Int32, parts: tuple[Part, ...]) -> tuple[bytes, Arrangement, SourceCorners]:
         sequence = self._sequence

@@ -34,6 +34,7 @@ def read(
     real_time: bool = False,
     warp: str | None = None,
     volume: bool = False,
+    texture: StrPath | None = None,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
@@ -49,6 +50,8 @@ def read(
             become a film of 25 frames a second. The times are kept either way.
         warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
         volume: whether what lies inside of a simulation's surface is read, too: volume cells, inner points, and their numbers.
+        texture: a picture for each frame, as the base colour of all materials: a folder, a glob or a pattern of pictures, or
+            a video.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -56,11 +59,31 @@ def read(
         TypeError: it is no path.
     """
     sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, volume)
+    if texture is not None:
+        sequence = add_texture(sequence, texture, frames)
     if warp is None:
         return sequence
     from gvpipe.model.warp import warped
 
     return warped(sequence, warp)
+
+
+def add_texture(sequence: MeshSequence, texture: StrPath, frames: tuple[int, int | None] | None = None) -> MeshSequence:
+    """Return a sequence with the pictures of a folder, a pattern or a video as its base colour, one for each frame.
+
+    Args:
+        sequence: with texture coordinates.
+        texture: names the pictures.
+        frames: those of a longer film that the sequence has.
+
+    Raises:
+        InputError: the pictures cannot be used, or there are no texture coordinates.
+    """
+    from gvpipe.io.picture_rows import open_pictures
+    from gvpipe.model.moving_texture import with_pictures
+
+    pictures = open_pictures(check_path(texture, "the texture"), len(sequence), frames)
+    return with_pictures(sequence, pictures, Path(os.fspath(texture)).stem.rstrip("_-. %0d#*") or "texture")
 
 
 def _read(

@@ -108,7 +108,7 @@ class Film:
             picture = self.cut.draw(frame, self.camera_of(k))
         else:
             values = self.shown.values(frame) if self.shown else None
-            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values)
+            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values, frame)
         if self.legend is None:
             return picture
         legend = self.legend

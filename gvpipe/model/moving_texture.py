@@ -1,0 +1,45 @@
+"""A moving image given to a sequence: the base colour of its materials."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from gvpipe.asset.image_choice import without_unused
+from gvpipe.asset.material import Image, Material, Texture
+from gvpipe.asset.part import Part
+from gvpipe.foundation.errors import InputError
+from gvpipe.model.sequence import MeshSequence
+
+
+def with_pictures(sequence: MeshSequence, pictures: Any, name: str = "texture") -> MeshSequence:
+    """Return the sequence with a picture per frame as the base colour of all its materials, of one that is made if it has none.
+
+    Args:
+        sequence: with texture coordinates ``uv``.
+        pictures: ``(F, height, width, 3) uint8``, or `gvpipe.asset.moving.Pictures`.
+        name: of the image.
+
+    Raises:
+        InputError: there are no texture coordinates, or another number of pictures than of frames.
+    """
+    uv = sequence.attributes.get("uv")
+    if uv is None or uv.domain not in ("vertex", "corner"):
+        raise InputError(
+            f"{sequence.name} has no texture coordinates for {name!r}; export the mesh with uv, or leave the texture out"
+        )
+    image = Image(name, pictures=pictures)
+    number = len(sequence.images)
+    given = sequence.materials or (Material(name=name, double_sided=True),)
+    parts = sequence.parts or (Part("", (0, sequence.n_vertices), (0, len(sequence.faces))),)
+    if any(part.material is None for part in parts):
+        given = given if not sequence.materials else (*given, Material(name=name, double_sided=True))
+        parts = tuple(replace(part, material=len(given) - 1) if part.material is None else part for part in parts)
+    materials, images = without_unused([_shows(material, number) for material in given], [*sequence.images, image])
+    return sequence.with_looks(materials, images, parts)
+
+
+def _shows(material: Material, number: int) -> Material:
+    before = material.base_color_texture
+    texture = Texture(number) if before is None else replace(before, image=number)
+    return replace(material, base_color_texture=texture, base_color=(1.0, 1.0, 1.0, material.base_color[3]))
