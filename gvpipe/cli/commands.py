@@ -155,8 +155,8 @@ def encode(
             )
         else:
             shared = "auto" if workers is None and PIPE not in sources else workers
-            placed = {"workers": shared, "scheduler": scheduler, "texture": shown_by}
-            report = api.encode(source, path, asked.codec, progress, **asked.keywords, **placed)
+            keywords = {**asked.keywords, "workers": shared, "scheduler": scheduler, "texture": shown_by}
+            report = api.encode(source, path, asked.codec, progress, **keywords)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     if not split:

@@ -57,7 +57,7 @@ class TexelFill:
         sums = [np.multiply(pixels, self._weights[0][:, :, None], dtype=np.float32)]
         for _ in self._weights[1:]:
             sums.append(_halved(sums[-1]))
-        colours: Float32 = sums.pop() * self._inverse[-1][:, :, None]
+        colours = np.asarray(sums.pop() * self._inverse[-1][:, :, None], np.float32)
         for level in range(len(sums) - 1, -1, -1):
             height, width = self._weights[level].shape
             larger = cv2.resize(colours, (width, height), interpolation=cv2.INTER_LINEAR)

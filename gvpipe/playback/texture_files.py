@@ -24,15 +24,15 @@ def write_tracks(player: Player, path: str) -> list[str]:
     target = Path(path)
     if target.suffix.lower() != ".mp4":
         raise InputError(f"{path}: textures that move are written as .mp4; end the name in it")
-    moving = [image for image in player.images if isinstance(image.pictures, CodedPictures)]
-    if not moving:
+    names = picture_names(player.images)
+    tracks = {name: image.pictures for name, image in zip(names, player.images, strict=True) if image.is_moving}
+    if not tracks:
         raise InputError(f"{player.path} has no texture that moves; leave out --texture-out")
-    written = []
-    names = picture_names(moving)
-    for image, name in zip(moving, names, strict=True):
-        assert isinstance(image.pictures, CodedPictures)
+    written: list[str] = []
+    for name, pictures in tracks.items():
+        assert isinstance(pictures, CodedPictures)
         with in_file(player.path):
-            data = image.pictures.track(player.fps)
+            data = pictures.track(player.fps)
         own = target if not written else target.with_name(f"{target.stem}-{Path(name).stem}{target.suffix}")
         with unnamed_path(own) as temporary:
             temporary.write_bytes(data)
