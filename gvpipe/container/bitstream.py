@@ -27,6 +27,7 @@ from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import CorruptFile, NewerVersion, TruncatedFile, corrupt, corrupt_section
 
 if TYPE_CHECKING:
+    from gvpipe.container.companion import Companion
     from gvpipe.container.shared_parts import SharedParts
     from gvpipe.media.video import Fragments
 
@@ -76,6 +77,8 @@ class Bitstream:
             (`gvpipe.container.live_layout`).
         budget: what its readers may take (`gvpipe.foundation.budget`).
         shared: what files of one data set have in common (`gvpipe.container.shared_parts`), None for a file alone.
+        companions: tracks beside the video, such as a sound.
+        lost: what is wrong with companions that the file had, a line each.
     """
 
     codec: str
@@ -95,6 +98,8 @@ class Bitstream:
     is_unfinished: bool = field(default=False, compare=False)
     budget: Budget = field(default=UNLIMITED, compare=False, repr=False)
     shared: SharedParts | None = field(default=None, compare=False, repr=False)
+    companions: tuple[Companion, ...] = ()
+    lost: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def layout(self) -> str:

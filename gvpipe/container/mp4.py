@@ -35,6 +35,7 @@ from gvpipe.container.bitstream import (
     unpack_payload,
 )
 from gvpipe.container.boxes import BOX, LARGE, Box, uuid_head
+from gvpipe.container.companion import Described, alone, attach, describe, detach, geometry_of, read_described, whole
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.live_layout import read_live
 from gvpipe.container.sample_tables import check_tables
@@ -147,7 +148,7 @@ def read_bytes(data: bytes, name: str, unlimited: bool = False, find: FindSectio
 
 
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
-    """Bytes of the codec's sections, of the video's samples and of everything else in a file of ``size`` bytes."""
+    """Bytes of the codec's sections, of the video's samples, of companions and of the rest, in a file of ``size`` bytes."""
     parts = dict(bitstream.section_sizes)
     fragments = bitstream.fragments
     if bitstream.is_unfinished:  # its poster is not read
@@ -156,11 +157,15 @@ def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
         parts["video"] = fragments.n_bytes
     elif bitstream.video:
         parts["video"] = inspect(bitstream.video, bitstream.budget).n_bytes
+    for companion in bitstream.companions:
+        parts[companion.kind] = parts.get(companion.kind, 0) + companion.n_bytes
     return {**parts, "container": size - sum(parts.values())}
 
 
 def load(bitstream: Bitstream) -> Bitstream:
     """The bitstream with all of its sections and its video in memory, checked as those of a file of the plain layout are.
+
+    Companions that are not whole are left out.
 
     Raises:
         CorruptFile: sections or pictures are not those that the header describes.
@@ -169,7 +174,9 @@ def load(bitstream: Bitstream) -> Bitstream:
     if fragments is None:
         return bitstream
     video = b"".join([fragments.head, *(fragments.read(number) for number in range(len(fragments.counts)))])
+    companions, lost = whole(bitstream.companions)
     loaded = replace(bitstream, sections=dict(bitstream.sections), video=video, fragments=None)
+    loaded = replace(loaded, companions=companions, lost=(*bitstream.lost, *lost))
     if f"{TAG_PREFIX}{VERSION} {_content_id(loaded)}".encode() not in fragments.head:
         raise corrupt("its geometry belongs to another file")
     return loaded
@@ -182,21 +189,25 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None, shared: Mapping[str,
         return _pack_bare(bitstream, shared)
     identity = _content_id(bitstream)
     track = inspect(bitstream.video)
-    extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration}
+    companions = bitstream.companions
+    extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration, **describe(companions)}
     if parts is not None:
-        video = remux_fragments(bitstream.video, f"{VERSION} {identity}")
-        return pack_stream(video, pack_header(bitstream, extra), bitstream.sections, parts)
+        fragmented = remux_fragments(bitstream.video, f"{VERSION} {identity}")
+        return pack_stream(fragmented, pack_header(bitstream, extra), bitstream.sections, parts, companions)
     payload = pack_payload(bitstream, extra)
-    return chain(remux(bitstream.video, f"{VERSION} {identity}"), [uuid_head(BOX_UUID, len(payload)), payload])
+    video = attach(remux(bitstream.video, f"{VERSION} {identity}"), companions)
+    return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
 
 def _pack_bare(bitstream: Bitstream, shared: Mapping[str, str] | None) -> Iterable[bytes]:
     """A file of the bare layout in parts."""
-    extra: dict[str, Any] = {}
-    video: Iterable[bytes] = [bare.NO_TRACKS]
+    companions = bitstream.companions
+    extra: dict[str, Any] = describe(companions)
+    video: Iterable[bytes] = alone(companions) if companions else [bare.NO_TRACKS]
     if bitstream.video:
-        track, video = inspect(bitstream.video), remux(bitstream.video)
-        extra = {"video_crc32": track.checksum, "track_crc32": track.configuration}
+        video = attach(remux(bitstream.video), companions)
+        track = inspect(bitstream.video)
+        extra = {"video_crc32": track.checksum, "track_crc32": track.configuration, **extra}
     payload = bare.pack_bare(bitstream, extra, shared)
     return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
@@ -247,8 +258,9 @@ def _read(file: IO[bytes], size: int, budget: Budget, find: FindSection | None) 
         bitstream, header = bare.unpack_bare(payload, budget, find)
         return _with_pictures(replace(bitstream, n_bytes=size + bitstream.n_bytes), header, video, layout)
     check_payload_version(payload)
-    check_tables(video[slice(*layout.moov)], layout.video_end)
-    track = inspect(video, budget)
+    own = geometry_of(video)
+    check_tables(own[slice(*layout.moov)], layout.video_end)
+    track = inspect(own, budget)
     tag = track.tag
     version = tag.partition(" ")[0]
     if version.isascii() and version.isdecimal() and len(version) < 10:
@@ -258,6 +270,9 @@ def _read(file: IO[bytes], size: int, budget: Budget, find: FindSection | None) 
     if container.text("id") != identity or (tag and tag.split()[-1] != identity):
         raise corrupt("its geometry belongs to another file")
     _check_track(container, track)
+    described = read_described(container)
+    if described or own is not video:
+        return _with_companions(replace(bitstream, n_bytes=size), video, described, n_own=1)
     return replace(bitstream, video=video, n_bytes=size)
 
 
@@ -267,9 +282,22 @@ def _with_pictures(bitstream: Bitstream, header: JsonObject, video: bytes, layou
         if video != bare.NO_TRACKS:
             raise corrupt("it has a video that its header does not describe")
         return bitstream
-    check_tables(video[slice(*layout.moov)], layout.video_end)
-    _check_track(header.object("container"), inspect(video, bitstream.budget))
+    container = header.object("container")
+    described = read_described(container)
+    n_own = int("video_crc32" in container or not described)
+    own = geometry_of(video) if n_own else b""
+    if n_own:
+        check_tables(own[slice(*layout.moov)], layout.video_end)
+        _check_track(container, inspect(own, bitstream.budget))
+    if described or own is not video:
+        return _with_companions(bitstream, video, described, n_own)
     return replace(bitstream, video=video)
+
+
+def _with_companions(bitstream: Bitstream, video: bytes, described: list[Described], n_own: int) -> Bitstream:
+    """A file's bitstream with its video and its companions, as far as these are whole."""
+    found = detach(video, described, n_own)
+    return replace(bitstream, video=found.video, companions=found.companions, lost=found.lost)
 
 
 def _check_track(container: JsonObject, track: Track) -> None:

@@ -18,6 +18,7 @@ MAX_EDITS = 4  # encoders of other tools write one or two
 HEAD = struct.Struct(">I")  # entries, after version and flags
 SIZES = struct.Struct(">II")  # size of every sample or 0, samples
 ENTRY_BYTES = {b"stts": 8, b"ctts": 8, b"stsc": 12, b"stco": 4, b"co64": 8, b"stss": 4, b"elst": 12, b"sbgp": 8, b"keys": 8}
+BEFORE_COUNT = {b"sbgp": 8}  # bytes before the number of entries, where they are not 4: its type of group
 RUNS = (b"stts", b"ctts")  # of samples: [32 bits] how many, and what they have in common
 UNUSED = (b"cmov", b"stz2", b"mvex", b"moof")  # compressed headers, packed sizes, fragments
 
@@ -33,7 +34,7 @@ def check_tables(moov: bytes, n_bytes: int) -> None:
     for table in _find(moov, b"stsz", 4):
         n_samples = max(n_samples, _count_samples(table, n_bytes))
     for kind, size in ENTRY_BYTES.items():
-        for table in _find(moov, kind, 4):
+        for table in _find(moov, kind, BEFORE_COUNT.get(kind, 4)):
             _check_entries(kind, table, size, n_samples)
 
 
@@ -52,7 +53,7 @@ def check_no_samples(moov: bytes) -> None:
         if _count_samples(table, 0):
             raise _wrong(b"stsz", "pictures are in fragments alone")
     for kind, size in ENTRY_BYTES.items():
-        for table in _find(moov, kind, 4):
+        for table in _find(moov, kind, BEFORE_COUNT.get(kind, 4)):
             _check_entries(kind, table, size, 0)
 
 

@@ -8,7 +8,7 @@ disk or over HTTP, and a jump costs one segment::
             [u64] length, [u32] CRC-32, [u64] offset in the file;
             [u32] fragments, for each [u64] offset, [u32] bytes of moof, [u32] bytes of mdat, [u32] pictures, [u32] CRC-32;
             [u64] file size, [u32] bytes of ftyp and moov, [u32] their CRC-32; [u32] CRC-32 of all before; section "header"
-    other sections lie in "uuid" boxes DATA_UUID, fragments between them
+    other sections lie in "uuid" boxes DATA_UUID, fragments between them; samples of companions end the file
 
 Sections, their order, the header and the pictures are those of the plain layout (`gvpipe.container.mp4`).
 """
@@ -38,6 +38,8 @@ from gvpipe.container.bitstream import (
     read_header,
 )
 from gvpipe.container.boxes import BOX, LONGEST_HEAD, Box, read_box, uuid_head
+from gvpipe.container.companion import SECTION as COMPANION
+from gvpipe.container.companion import Companion, attach_head, detach_head, read_described, without_companions
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.fragments import Fragment, count_pictures, split_fragments
 from gvpipe.container.sample_tables import check_no_samples
@@ -66,7 +68,13 @@ class Place:
     checksum: int
 
 
-def pack_stream(fragmented: bytes, header: bytes, sections: Mapping[str, bytes], parts: SegmentParts) -> Iterator[bytes]:
+def pack_stream(
+    fragmented: bytes,
+    header: bytes,
+    sections: Mapping[str, bytes],
+    parts: SegmentParts,
+    companions: Sequence[Companion] = (),
+) -> Iterator[bytes]:
     """Yield the bytes of a file, in order.
 
     Args:
@@ -74,9 +82,15 @@ def pack_stream(fragmented: bytes, header: bytes, sections: Mapping[str, bytes],
         header: the section of that name.
         sections: the codec's.
         parts: what each segment has of sections and pictures.
+        companions: tracks beside the video.
+
+    Raises:
+        InputError: companions would lie too far back for their tables.
     """
-    head, fragments = split_fragments(fragmented)
-    n_bytes = index_size([HEADER, *sections], len(fragments)) + len(header)
+    own_head, fragments = split_fragments(fragmented)
+    head, _ = attach_head(own_head, companions, 0)  # as long as it will be
+    beside = [f"{COMPANION}{number}" for number in range(len(companions))]
+    n_bytes = index_size([HEADER, *sections, *beside], len(fragments)) + len(header)
     offset = len(head) + len(uuid_head(INDEX_UUID, n_bytes)) + n_bytes
     places = {HEADER: Place(offset - len(header), len(header), zlib.crc32(header))}
     table = np.zeros(len(fragments), FRAGMENT)
@@ -95,8 +109,13 @@ def pack_stream(fragmented: bytes, header: bytes, sections: Mapping[str, bytes],
             table[number] = (offset, len(moof), len(mdat), n_pictures, zlib.crc32(mdat, zlib.crc32(moof)))
             content += moof, mdat
             offset += len(moof) + len(mdat)
-    ordered = {name: places[name] for name in (HEADER, *sections)}
-    index = pack_index(ordered, table, WHOLE.pack(offset, len(head), zlib.crc32(head)))
+    head, boxes = attach_head(own_head, companions, offset)
+    content += boxes
+    for name, companion in zip(beside, companions, strict=True):
+        places[name] = Place(offset + BOX.size, companion.n_bytes, companion.checksum)
+        offset += BOX.size + companion.n_bytes
+    ordered = {name: places[name] for name in (HEADER, *sections, *beside)}
+    index = pack_index(ordered, table, WHOLE.pack(offset, len(head), zlib.crc32(without_companions(head))))
     yield from (head, uuid_head(INDEX_UUID, n_bytes), index, header, *content)
 
 
@@ -165,15 +184,19 @@ def read_stream(source: Source, index: Box, budget: Budget) -> Bitstream:
             rest.
     """
     places, fragments, head = _read_index(source, index)
-    moov = head[head.find(b"moov") - 4 :]
+    own_head = without_companions(head)
+    moov = own_head[own_head.find(b"moov") - 4 :]
     check_no_samples(moov)
     sections = StoredSections(source, places)
     bitstream, container = read_header(sections[HEADER], budget)
     if f"{TAG_PREFIX}{VERSION} {container.text('id')}".encode("utf-8", "replace") not in moov:  # JSON may hold any text
         raise corrupt("its geometry belongs to another file")
-    codec_sections = StoredSections(source, {name: place for name, place in places.items() if name != HEADER})
-    stored = StoredFragments(source, head, fragments)
-    return replace(bitstream, sections=codec_sections, fragments=stored, n_bytes=source.size)
+    beside = {name: place for name, place in places.items() if name.startswith(COMPANION)}
+    found = detach_head(head, read_described(container), StoredSections(source, beside))
+    codec_sections = StoredSections(source, {name: places[name] for name in places if name not in {HEADER, *beside}})
+    stored = StoredFragments(source, own_head, fragments)
+    read = replace(bitstream, sections=codec_sections, fragments=stored, n_bytes=source.size)
+    return replace(read, companions=found.companions, lost=found.lost)
 
 
 @dataclass(frozen=True)
@@ -208,7 +231,7 @@ def _read_index(source: Source, index: Box) -> tuple[dict[str, Place], np.ndarra
         raise corrupt_section("index", "its place is not behind the description of the video")
     check_places(found.places, found.fragments, index.content + found.n_bytes, found.size)
     head = source.read(0, head_size)
-    if zlib.crc32(head) != head_checksum:
+    if zlib.crc32(without_companions(head)) != head_checksum:
         raise corrupt("the description of its video is damaged")
     return found.places, found.fragments, head
 
@@ -292,6 +315,10 @@ class StoredSections(Mapping[str, bytes]):
     def sizes(self) -> dict[str, int]:
         """Bytes of every section."""
         return {name: place.length for name, place in self._places.items()}
+
+    def offset(self, name: str) -> int:
+        """Where a section begins in the file."""
+        return self._places[name].offset
 
 
 class StoredFragments:
