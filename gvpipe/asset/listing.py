@@ -51,15 +51,19 @@ def list_things(things: Things) -> dict[str, Any]:
         ],
         "polygons": {str(corners): count for corners, count in things.polygons.items()},
         "materials": [material.name for material in things.materials],
-        "images": [
-            {
-                "name": image.name,
-                "media_type": image.media_type,
-                "size": None if image.size is None else list(image.size),
-                "bytes": len(image.data),
-                **({} if image.pictures is None else {"frames": len(image.pictures)}),
-            }
-            for image in things.images
-        ],
+        "images": [_image(image) for image in things.images],
         "metadata": {**dataclasses.asdict(things.metadata), "times": list(things.metadata.times)},
     }
+
+
+def _image(image: Image) -> dict[str, Any]:
+    values = {
+        "name": image.name,
+        "media_type": image.media_type,
+        "size": None if image.size is None else list(image.size),
+        "bytes": len(image.data),
+    }
+    if image.pictures is None:
+        return values
+    coded = {"codec": getattr(image.pictures, "codec", ""), "bytes": getattr(image.pictures, "n_bytes", 0)}
+    return {**values, **coded, "frames": len(image.pictures)}

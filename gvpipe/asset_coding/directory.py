@@ -198,7 +198,7 @@ def file_notes(directory: Directory, bitstream: Bitstream) -> tuple[str, ...]:
     unfinished = (UNFINISHED,) if bitstream.is_unfinished else ()
     skipped = directory.skipped
     newer = f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(skipped)}"
-    return (*unfinished, *((printable(newer),) if skipped else ()))
+    return (*unfinished, *((printable(newer),) if skipped else ()), *bitstream.lost)
 
 
 def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:

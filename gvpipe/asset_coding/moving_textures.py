@@ -21,7 +21,7 @@ from gvpipe.foundation.arrays import Bool, UInt8
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.errors import SettingError
 from gvpipe.media.picture_reader import PictureReader, take_apart
-from gvpipe.media.picture_video import COPY, DEFAULT_QUALITY, check_choice, encode_pictures
+from gvpipe.media.picture_video import COPY, DEFAULT_QUALITY, READ, check_choice, codec_of, copy_pictures, encode_pictures
 from gvpipe.media.texel_fill import TexelFill
 from gvpipe.model.sequence import MeshSequence
 
@@ -36,7 +36,7 @@ class CodedPictures(Protocol):
 
     @property
     def codec(self) -> str:
-        """Of the track, by FFmpeg's name."""
+        """Of the track: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
         ...
 
     def track(self, fps: float) -> bytes:
@@ -100,8 +100,9 @@ def code_moving(images: Sequence[Image], sequence: MeshSequence, coding: MovingC
         width, height = image.pictures.size
         used = None if coding.copies(image.pictures) else used_texels(sequence, number, (width, height))
         used = used if used is not None and used.any() else None  # no triangle shows it
-        about = {"image": number, "width": width, "height": height}
-        companions.append(Companion.of(KIND, about, code_pictures(image.pictures, sequence.fps, coding, used)))
+        track = code_pictures(image.pictures, sequence.fps, coding, used)
+        about = {"image": number, "codec": codec_of(track), "width": width, "height": height}
+        companions.append(Companion.of(KIND, about, track))
     return tuple(companions)
 
 
@@ -118,13 +119,16 @@ class TrackPictures(PictureReader):
 
     @property
     def codec(self) -> str:
-        """Of the track, by FFmpeg's name."""
-        return self.coded().codec
+        """Of the track: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
+        return str(self._companion.about.get("codec", ""))
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of its coded pictures."""
+        return self._companion.n_bytes
 
     def track(self, fps: float) -> bytes:
         """As of `CodedPictures`."""
-        from gvpipe.media.picture_video import copy_pictures
-
         return copy_pictures(self._companion.file(), self._name, fps, len(self))
 
 
@@ -144,6 +148,7 @@ def read_moving(companions: Sequence[Companion], names: Mapping[int, str], n_fra
         about = JsonObject(dict(companion.about), "header")
         number = about.integer("image", 0, MAX_IMAGES)
         size = about.integer("width", 1, MAX_SIDE), about.integer("height", 1, MAX_SIDE)
+        about.choice("codec", READ)
         if number in names and number not in images:
             pictures = TrackPictures(companion, names[number], size, n_frames, budget)
             images[number] = Image(names[number], MOVING, b"", pictures)

@@ -12,6 +12,7 @@ from gvpipe.foundation.arrays import Array, Bool, Float64
 from gvpipe.model.sequence import MeshSequence
 
 PER_TEXEL = 1.5  # points that are looked at along a texel
+INWARD = 1e-3  # that they are moved to the middle of their triangle: an edge between two texels shows those inside alone
 MOST_POINTS = 1 << 20  # at a time
 LARGEST = 4  # images that a triangle may span; where one spans more, all texels are shown
 
@@ -67,7 +68,7 @@ def _shown(sequence: MeshSequence, number: int) -> Iterator[tuple[Texture, Array
 def _grid(n: int) -> Float64:
     """Weights of the corners ``(P, 3)`` of points in a triangle, n + 1 along each side."""
     i, j = np.nonzero(np.add.outer(np.arange(n + 1), np.arange(n + 1)) <= n)
-    return np.stack([i, j, n - i - j], axis=1) / n
+    return (1 - INWARD) / n * np.stack([i, j, n - i - j], axis=1) + INWARD / 3
 
 
 def _wrapped(texels: Float64, n: int, wrap: str) -> Array:
@@ -76,7 +77,6 @@ def _wrapped(texels: Float64, n: int, wrap: str) -> Array:
     if wrap == "clamp":
         return np.clip(index, 0, n - 1)
     if wrap == "repeat":
-        at_end = texels == n  # the edge itself belongs to the last texel
-        return np.where(at_end, n - 1, index % n)
+        return index % n
     index %= 2 * n
     return np.minimum(index, 2 * n - 1 - index)

@@ -91,13 +91,13 @@ class VideoPictures(PictureReader):
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        coded, size = take_apart_file(path)
+        coded, size, self._codec = take_apart_file(path)
         super().__init__(lambda: coded, size, len(coded.packets), name=path.name)
 
     @property
     def codec(self) -> str:
-        """Of the track, by FFmpeg's name."""
-        return self.coded().codec
+        """Of the track: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
+        return self._codec
 
     def track(self, fps: float) -> bytes:
         """Its coded pictures as an MP4 file of one track; raises `InputError`."""

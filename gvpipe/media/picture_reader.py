@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import io
 from bisect import bisect_right
-from pathlib import Path
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from gvpipe.foundation.arrays import UInt8
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, corrupt
 from gvpipe.foundation.picture_limits import BYTES_PER_PIXEL, picture_limits
-from gvpipe.media.picture_video import ACCURATE, BILINEAR, first_video, video_error
+from gvpipe.media.picture_video import ACCURATE, BILINEAR, codec_name, first_video, video_error
 from gvpipe.runtime.forks import ForkLock
 
 KEPT = 48 << 20  # bytes of decoded samples
@@ -62,8 +62,12 @@ def take_apart(video: bytes, budget: Budget = UNLIMITED) -> CodedPictures:
         raise corrupt(f"the video of a moving texture cannot be read ({exc})") from exc
 
 
-def take_apart_file(path: Path) -> tuple[CodedPictures, tuple[int, int]]:
-    """Return the coded pictures of a video file's first video track, and their width and height; raises `InputError`."""
+def take_apart_file(path: Path) -> tuple[CodedPictures, tuple[int, int], str]:
+    """Return the coded pictures of a video file's first video track, their width and height, and their codec.
+
+    Raises:
+        InputError: it cannot be read.
+    """
     import av
 
     name = str(path)
@@ -76,7 +80,7 @@ def take_apart_file(path: Path) -> tuple[CodedPictures, tuple[int, int]]:
                 raise InputError(f"{name}: its first picture is no key frame; make the video again, from its first frame on")
             context: Any = stream.codec_context
             coded = CodedPictures([bytes(each) for each in packets], [*starts, len(packets)], context.name, context.extradata)
-            return coded, (int(context.width), int(context.height))
+            return coded, (int(context.width), int(context.height)), codec_name(context)
     except (av.FFmpegError, OSError, ValueError) as exc:
         raise video_error(path, exc) from exc
 

@@ -213,20 +213,20 @@ def copy_pictures(video: str | os.PathLike[str] | bytes, name: str, fps: float, 
             late = max(number - place[packet.pts or 0] for number, packet in enumerate(packets))
             with av.open(file, "w", format="mp4", options={"fflags": "+bitexact"}) as target:
                 copy = target.add_stream_from_template(stream)
-                filtered = _stating_colours(stream)
+                stating = _stating_colours(stream, copy)
                 for number, packet in enumerate(packets):
-                    packet.time_base = 1 / rate
-                    packet.pts, packet.dts, packet.duration = place[packet.pts or 0], number - late, 1
-                    for one in filtered(packet):
-                        one.stream = copy
-                        target.mux(one)
+                    is_key, shown = packet.is_keyframe, place[packet.pts or 0]
+                    [coded] = stating(packet)
+                    coded.stream, coded.time_base, coded.is_keyframe = copy, 1 / rate, is_key
+                    coded.pts, coded.dts, coded.duration = shown, number - late, 1
+                    target.mux(coded)
             file.seek(0)
             return file.read()
     except (av.FFmpegError, OSError) as exc:
         raise video_error(name, exc) from exc
 
 
-def _stating_colours(stream: Any) -> Callable[[Any], Iterable[Any]]:
+def _stating_colours(stream: Any, copy: Any) -> Callable[[Any], list[Any]]:
     """What makes packets say how their colours are coded, where they do not: BT.709 in limited range, which readers assume."""
     import av
 
@@ -236,8 +236,8 @@ def _stating_colours(stream: Any) -> Callable[[Any], Iterable[Any]]:
         return lambda packet: [packet]
     is_full = int(int(context.color_range) == 2)
     asked = filters[context.name].format(is_full) + ":matrix_coefficients=1:colour_primaries=1:transfer_characteristics=13"
-    made = av.BitStreamFilterContext(asked, stream)
-    return lambda packet: made.filter(packet)
+    made = av.BitStreamFilterContext(asked, stream, copy)
+    return lambda packet: list(made.filter(packet))
 
 
 def first_video(container: Any, name: str) -> Any:
@@ -249,6 +249,14 @@ def first_video(container: Any, name: str) -> Any:
     if codec not in READ:
         raise InputError(f"{name} is a video of {codec}; {', '.join(READ)} are read, so make it one of these, or give pictures")
     return streams[0]
+
+
+def codec_of(track: bytes) -> str:
+    """The codec of a track, by FFmpeg's name."""
+    import av
+
+    with av.open(io.BytesIO(track), "r", format="mp4") as container:
+        return codec_name(first_video(container, "the track").codec_context)
 
 
 def codec_name(context: Any) -> str:

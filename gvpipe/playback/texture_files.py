@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gvpipe.asset_coding.moving_textures import CodedPictures
+from gvpipe.asset_coding.moving_textures import TrackPictures
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError, in_file
 from gvpipe.io.pictures import picture_names
@@ -25,12 +25,12 @@ def write_tracks(player: Player, path: str) -> list[str]:
     if target.suffix.lower() != ".mp4":
         raise InputError(f"{path}: textures that move are written as .mp4; end the name in it")
     names = picture_names(player.images)
-    tracks = {name: image.pictures for name, image in zip(names, player.images, strict=True) if image.is_moving}
+    pairs = zip(names, player.images, strict=True)
+    tracks = {name: image.pictures for name, image in pairs if isinstance(image.pictures, TrackPictures)}
     if not tracks:
         raise InputError(f"{player.path} has no texture that moves; leave out --texture-out")
     written: list[str] = []
     for name, pictures in tracks.items():
-        assert isinstance(pictures, CodedPictures)
         with in_file(player.path):
             data = pictures.track(player.fps)
         own = target if not written else target.with_name(f"{target.stem}-{Path(name).stem}{target.suffix}")
