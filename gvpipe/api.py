@@ -188,7 +188,7 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp, volume, texture: as for `read`. The volume of a sequence is always coded.
+        clip, mesh, frames, unlimited, real_time, warp, volume, texture: as for `read`. A sequence's volume is always coded.
         texture_quality: of textures with a picture for each frame, 0..100, higher is better; None: 75.
         texture_codec: of these: ``"h264"``, which all browsers play, ``"hevc"``, ``"av1"``, or ``"copy"`` for the pictures of a
             video as they are coded. None: ``"copy"`` for a video of H.264 where no quality is given, else ``"h264"``.

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
+from dataclasses import field as member
 from typing import Any
 
 from gvpipe.asset.attribute import check_word
@@ -55,7 +56,7 @@ class Image:
     name: str
     media_type: str = ""
     data: bytes = b""
-    pictures: Pictures | None = field(default=None, compare=False)
+    pictures: Pictures | None = member(default=None, compare=False)
 
     def __post_init__(self) -> None:
         if self.pictures is not None:

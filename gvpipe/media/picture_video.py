@@ -29,7 +29,7 @@ GROUP = 32  # pictures
 DEFAULT_QUALITY = 75
 COPY = "copy"  # of a video that is there: its coded pictures as they are
 UNSTATED, BT709, SRGB, LIMITED = 2, 1, 13, 1  # of ISO/IEC 23091-2; FFmpeg's number of the range
-# of swscale: filters and rounding without its quick ways, which lose 8 dB: they copy chroma to four texels, and shift all levels
+# of swscale, without its quick ways, which lose 8 dB: they copy chroma to four texels, and shift all levels
 BICUBIC, BILINEAR, ACCURATE = 4, 2, 1 << 13 | 1 << 14 | 1 << 18
 READ = ("h264", "hevc", "av1", "vp9")  # codecs of videos that may be copied, by FFmpeg's names
 

@@ -1,4 +1,4 @@
-"""Pictures to PNG: of 16 bits a channel, which Pillow does not write, and of 8 bits, which OpenCV writes several times sooner."""
+"""Pictures to PNG: of 16 bits a channel, which Pillow does not write, and of 8 bits, which OpenCV writes sooner."""
 
 from __future__ import annotations
 

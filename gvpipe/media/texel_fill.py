@@ -5,7 +5,8 @@
 spread through a pyramid: each level holds the mean of the used texels below it, and what is empty takes the level above,
 interpolated (pull and push; Gortler, Grzeszczuk, Szeliski and Cohen, "The Lumigraph", 1996, section 3.4).
 
-Far from all charts the first picture's fill stays, since what moves costs bits: a quarter of all, at 1024 x 1024 of which a quarter is used.
+Far from all charts the first picture's fill stays, since what moves costs bits: a quarter of all of them, at 1024 x 1024
+texels of which a quarter is used.
 """
 
 from __future__ import annotations

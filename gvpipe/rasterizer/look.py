@@ -51,7 +51,7 @@ class Asset(Protocol):
 
 
 def look_of(asset: Asset) -> tuple[Look, tuple[str, ...], MovingTexels]:
-    """Return the look of an asset, that of none if it has neither materials nor colours, notes on images left out, and what moves.
+    """Return an asset's look (that of none without materials and colours), notes on images left out, and what moves.
 
     Raises:
         InputError: a texture's uv attribute is missing, or is none of vertices or corners.

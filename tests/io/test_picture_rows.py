@@ -15,7 +15,8 @@ from PIL import Image
 import gvpipe
 from gvpipe.cli.commands import cli
 from gvpipe.errors import InputError
-from gvpipe.io.picture_rows import FilePictures, open_pictures
+from gvpipe.io.picture_files import FilePictures
+from gvpipe.io.picture_rows import open_pictures
 from gvpipe.media.picture_video import encode_pictures
 from gvpipe.model.moving_texture import with_pictures
 

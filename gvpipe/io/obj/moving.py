@@ -16,7 +16,7 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.io.obj.changes import libraries_of
 from gvpipe.io.obj.lines import decode_name
 from gvpipe.io.obj.mtl import names_in, read_mtl
-from gvpipe.io.picture_rows import FilePictures
+from gvpipe.io.picture_files import FilePictures
 from gvpipe.io.pictures import Pictures, find_beside
 
 
