@@ -6,6 +6,8 @@ names its number. How a row of pictures becomes a track is `gvpipe.media.picture
 
 from __future__ import annotations
 
+import itertools
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -20,6 +22,7 @@ from gvpipe.container.json_object import JsonObject
 from gvpipe.foundation.arrays import Bool, UInt8
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.errors import SettingError
+from gvpipe.media.picture_reader import CodedPictures as CodedTrack
 from gvpipe.media.picture_reader import PictureReader, take_apart
 from gvpipe.media.picture_video import COPY, DEFAULT_QUALITY, READ, check_choice, codec_of, copy_pictures, encode_pictures
 from gvpipe.media.texel_fill import TexelFill
@@ -101,7 +104,8 @@ def code_moving(images: Sequence[Image], sequence: MeshSequence, coding: MovingC
         used = None if coding.copies(image.pictures) else used_texels(sequence, number, (width, height))
         used = used if used is not None and used.any() else None  # no triangle shows it
         track = code_pictures(image.pictures, sequence.fps, coding, used)
-        about = {"image": number, "codec": codec_of(track), "width": width, "height": height}
+        coded = take_apart(track)
+        about = {"image": number, "codec": codec_of(track), "width": width, "height": height, "groups": group_checksums(coded)}
         companions.append(Companion.of(KIND, about, track))
     return tuple(companions)
 
@@ -130,6 +134,12 @@ class TrackPictures(PictureReader):
     def track(self, fps: float) -> bytes:
         """As of `CodedPictures`."""
         return copy_pictures(self._companion.file(), self._name, fps, len(self))
+
+
+def group_checksums(coded: CodedTrack) -> list[list[int]]:
+    """Of each group of pictures their number, and the CRC-32 of their bytes, for readers that fetch some groups alone."""
+    spans = itertools.pairwise(coded.starts)
+    return [[stop - start, zlib.crc32(b"".join(coded.packets[start:stop]))] for start, stop in spans]
 
 
 def read_moving(companions: Sequence[Companion], names: Mapping[int, str], n_frames: int, budget: Budget) -> dict[int, Image]:

@@ -9,11 +9,13 @@
 import { NO_ASSET, readAsset, readCoarseAsset } from "./asset/asset.js";
 import { openCodec } from "./codecs.js";
 import { readContainer } from "./format/boxes.js";
+import { geometryAlone, placesInFile, readCompanions } from "./format/companions.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
 import { OUTAGE, closed, request } from "./format/request.js";
 import { StreamFile } from "./format/stream_file.js";
+import { MovingImages } from "./moving/moving_images.js";
 import { checkRate } from "./playback_rate.js";
 
 export { GeometryVideoError };
@@ -60,7 +62,8 @@ export class GeometryVideo {
       closing.signal.throwIfAborted();
       const payload = await readPayload(file ? readContainer(file) : parts.container);
       const repeated = readRepeatedFrames(payload);
-      reader = await openCodec(file ?? parts, payload, repeated, level, closing.signal);
+      const companions = file ? companionsOf(file, payload.header) : parts.companions(payload.header.container.companions);
+      reader = await openCodec(file ? (companions.length ? geometryAlone(file) : file) : parts, payload, repeated, level, closing.signal);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
       closing.signal.throwIfAborted();
@@ -71,6 +74,7 @@ export class GeometryVideo {
       video.#isInParts = !file;
       video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
+      video.#companions = companions;
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       if (parts?.isGrowing) video.#watch(parts);
       return video;
@@ -86,6 +90,9 @@ export class GeometryVideo {
   }
 
   #payload;
+  #companions = []; // tracks beside the geometry's
+  #moving = null; // MovingImages, once they are asked for
+  #opening = null; // a promise of them
   #repeated;
   #reader;
   #pictures;
@@ -179,7 +186,7 @@ export class GeometryVideo {
     }
     return this.#queued(async () => {
       this.pause();
-      await this.#pictures.seek(k);
+      await Promise.all([this.#pictures.seek(k), this.#besideOf(k)]);
       return this.#read(k, positions ?? new Float32Array(3 * this.vertexCount));
     });
   }
@@ -242,6 +249,37 @@ export class GeometryVideo {
     this.#pictures.pause();
   }
 
+  /**
+   * Have the pictures of images that move from now on: no frame is given before its pictures are here.
+   *
+   * @param {Iterable<number>} wanted numbers of images, of the first call
+   * @returns {Promise<MovingImages>} `show(k)` gives those of the frame that was given last
+   */
+  openMoving(wanted) {
+    this.#opening ??= this.#openMoving(wanted);
+    return this.#opening;
+  }
+
+  async #openMoving(wanted) {
+    const { header, budget } = this.#payload;
+    const moving = await MovingImages.open(this.images, wanted, this.#companions, header, budget);
+    if (this.#isClosed) moving.close();
+    this.#moving = moving;
+    await this.#queued(() => moving.ready(this.#shown));
+    this.#waitBeside();
+    return moving;
+  }
+
+  /** That all pictures beside a frame are here. */
+  #besideOf(k) {
+    return this.level === 0 ? this.#moving?.ready(k) : undefined;
+  }
+
+  /** Clocks show no frame before what lies beside it is here. */
+  #waitBeside() {
+    this.#pictures.beside = this.#moving?.isEmpty === false && this.level === 0 ? (k) => this.#moving.ready(k) : null;
+  }
+
   /** Free the video; the object is of no use afterwards. */
   close() {
     this.#isClosed = true;
@@ -249,6 +287,7 @@ export class GeometryVideo {
     this.#pictures.close();
     this.#beside?.then((pictures) => pictures.close()).catch(() => {});
     this.#asset?.close();
+    this.#moving?.close();
     this.#reader.close();
     this.#closeFile();
   }
@@ -306,6 +345,7 @@ export class GeometryVideo {
     /** `Int32Array` (V, 3): the first frame on the file's lattice, if it has one; vertices with equal rows are one point of the surface. */
     this.basePoints = reader.basePoints;
     this.#takeAsset(asset);
+    this.#waitBeside();
   }
 
   /** The whole mesh, which `reader` reads, as `readAsset` needs it while another level is shown. */
@@ -330,7 +370,7 @@ export class GeometryVideo {
     /** `Map` by name of `CodedField`s: `frame(k)` is a promise of an array (R, C) of the field's `type`. */
     this.fields = asset.fields;
     this.materials = asset.materials;
-    /** `{name, mediaType, data}` */
+    /** `{name, mediaType, data}`; data is null of those that move (`openMoving`). */
     this.images = asset.images;
     /** (P) corners of each polygon, or null if all are triangles. */
     this.polygons = asset.polygons;
@@ -373,6 +413,12 @@ export class GeometryVideo {
     positions.set(this.#pictures.current);
     return positions;
   }
+}
+
+/** Tracks beside the geometry's of a file that is here. */
+function companionsOf(file, { container: { companions } }) {
+  const read = async (offset, length) => file.subarray(offset, offset + length);
+  return Array.isArray(companions) ? readCompanions(companions, file, placesInFile(file, companions.length), read) : [];
 }
 
 /** @throws {TypeError} it is nothing that can be loaded */

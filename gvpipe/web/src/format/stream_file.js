@@ -7,6 +7,7 @@ import { readFragmentSamples } from "../fragments.js";
 import { readDescription, ranks } from "../track.js";
 import { findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
+import { geometryAlone, readCompanions, SECTION as COMPANION } from "./companions.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
@@ -101,7 +102,13 @@ export class StreamFile {
 
   /** What a decoder of its pictures is set up with. @throws {GeometryVideoError} */
   get description() {
-    return readDescription(this.head);
+    return readDescription(geometryAlone(this.head));
+  }
+
+  /** The companions that its header describes, of which parts are fetched. @returns {import("./companions.js").Companion[]} */
+  companions(described) {
+    const read = (offset, length) => this.#fetch(offset, length);
+    return this.head ? readCompanions(described, this.head, (number) => this.places.get(`companion.${number}`), read) : [];
   }
 
   /** What `readContainer` gives of a whole file. */
@@ -198,7 +205,7 @@ export class StreamFile {
       const number = OF_SEGMENTS.exec(name)?.[2];
       if (number) this.segments.set(number, [...(this.segments.get(number) ?? []), name]);
     }
-    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name) && !OF_FIELDS.test(name));
+    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name) && !OF_FIELDS.test(name) && !COMPANION.test(name));
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);

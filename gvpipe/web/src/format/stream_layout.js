@@ -10,6 +10,7 @@ import {
   BITSTREAM_VERSION as VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
+import { geometryAlone, SECTION as COMPANION } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 
@@ -30,6 +31,7 @@ export function readStream(file, box) {
   checkHead(file, headSize, headChecksum);
   const sections = new Map();
   for (const { name, offset, length, checksum } of entries) {
+    if (COMPANION.test(name)) continue;
     const data = take(file, offset, length);
     if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
     sections.set(name, data);
@@ -48,7 +50,7 @@ export function readStream(file, box) {
 /** The boxes `ftyp` and `moov`, at the start of a file. */
 export function checkHead(file, size, checksum) {
   const head = take(file, 0, size);
-  if (crc32(head) !== checksum) {
+  if (crc32(geometryAlone(head)) !== checksum) {
     throw new GeometryVideoError("corrupt", `the description of its video is damaged; ${AGAIN}`);
   }
   return head;

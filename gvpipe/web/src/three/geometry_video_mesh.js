@@ -49,13 +49,15 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<GeometryVideoMesh>}
    */
   static async create(video, { centre = [0, 0, 0], scale = 1, gloss = true, anisotropy = 1, environment = () => null, ownClock = false } = {}) {
+    const moving = await video.openMoving(shownImages(video));
     const positions = await video.frame(video.startFrame);
-    const textures = await openTextures(video, anisotropy);
-    return new GeometryVideoMesh(video, positions, textures, { centre, scale, gloss, anisotropy, environment, ownClock });
+    const textures = await openTextures(video, anisotropy, moving, video.startFrame);
+    return new GeometryVideoMesh(video, positions, textures, { moving, centre, scale, gloss, anisotropy, environment, ownClock });
   }
 
   #view;
   #textures;
+  #moving; // MovingImages
   #playback;
   #now = 0; // ms of `update`'s clock
   #tick = null; // what waits for its next step
@@ -91,6 +93,8 @@ export class GeometryVideoMesh extends Mesh {
     this.video = video;
     this.#view = view;
     this.#textures = textures;
+    this.#moving = view.moving;
+    this.#moving.lost = (note) => (this.notes = [...this.notes, note]);
     this.frustumCulled = false; // the box of the motion may be a little small
     this.#open(positions, new Set());
     const on = {
@@ -306,6 +310,7 @@ export class GeometryVideoMesh extends Mesh {
   }
 
   #show(positions, k) {
+    if (!this.#showPictures(k)) return;
     if (this.video.level === this.#level) {
       this.#place(positions, k);
       this.#setBounds();
@@ -315,6 +320,16 @@ export class GeometryVideoMesh extends Mesh {
       this.#changeLevel(positions);
     }
     this.dispatchEvent({ type: "frame", frame: k });
+  }
+
+  /** Show the pictures of textures that move; false where they are gone by now, and the frame is not shown. */
+  #showPictures(k) {
+    const moving = this.#moving;
+    if (!moving || this.video.level > 0) return true;
+    const pictures = moving.show(k);
+    if (pictures) this.#textures.show(pictures);
+    else if (this.paused) this.#playback.seek(k); // another frame was asked for meanwhile
+    return pictures !== null;
   }
 
   /** Make all that depends on vertices and triangles; of these parts none is drawn. */
@@ -330,7 +345,7 @@ export class GeometryVideoMesh extends Mesh {
     const { channels, notes } = uvChannels(video.materials, video.attributes);
     this.#channels = channels;
     /** What is not shown as it should be, a line each. */
-    this.notes = [...video.notes, ...notes, ...this.#textures.notes];
+    this.notes = [...video.notes, ...notes, ...this.#textures.notes, ...(this.#moving?.notes ?? [])];
     if (video.triangleCount && !this.#groupsOf.has(video.level)) this.#groupsOf.set(video.level, this.#groupNormals());
     this.#groups = this.#groupsOf.get(video.level) ?? null;
     this.#normals = null;
@@ -356,7 +371,7 @@ export class GeometryVideoMesh extends Mesh {
       moved.then(() => this.dispatchEvent({ type: "change" }), (error) => this.#tellError(error));
     }
     if (!video.images.length || this.#textures.images === video.images) return;
-    this.#opening = openTextures(video, this.#view.anisotropy).then((textures) => {
+    this.#opening = openTextures(video, this.#view.anisotropy, this.#moving, this.currentFrame).then((textures) => {
       this.#textures.dispose();
       this.#textures = textures;
       this.notes = [...this.notes, ...textures.notes];
@@ -591,10 +606,15 @@ function partOf(parts, things, number) {
   return parts.find(({ [things]: [start, stop] }) => start <= number && number < stop)?.name ?? null;
 }
 
-/** The images that materials show, decoded. */
-function openTextures({ materials, images }, anisotropy) {
+/** Numbers of the images that materials show. */
+function shownImages({ materials }) {
   const textures = materials.flatMap((material) => Object.values(material).filter((value) => value?.uv !== undefined));
-  return Textures.open(images, new Set(textures.map(({ image }) => image)), anisotropy);
+  return new Set(textures.map(({ image }) => image));
+}
+
+/** The images that materials show, decoded; of those that move, the pictures of a frame. */
+async function openTextures(video, anisotropy, moving, frame) {
+  return Textures.open(video.images, shownImages(video), anisotropy, moving?.show(frame) ?? new Map());
 }
 
 /** Which value of an attribute each render vertex has. */
