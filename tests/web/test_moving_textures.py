@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -24,21 +25,46 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(REASON), reason=REASON)]
 FRAMES = 40
 PAGE = """<!doctype html><link rel="icon" href="data:,"><script type="importmap">{ "imports": {
 "three": "./three/build/three.module.js", "three/addons/": "./three/examples/jsm/", "gvpipe/three": "./gvpipe/three.js" } }
-</script>"""
-START = """const THREE = await import("three");
-    const { GeometryVideoLoader } = await import("gvpipe/three");
-    const mesh = await new GeometryVideoLoader().setOptions({ ownClock: true }).loadAsync(args[0]);
-    const renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
-    renderer.setSize(64, 64);
-    const camera = new THREE.OrthographicCamera(0, 1, 1, 0, -10, 10);
-    const scene = new THREE.Scene().add(mesh);
-    const gl = renderer.getContext();
-    const drawn = () => {
-      renderer.render(scene, camera);
-      const pixel = new Uint8Array(4);
-      gl.readPixels(32, 32, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-      return [Math.round(mesh.framePositions[2] * 10), ...pixel.slice(0, 3)];
-    };"""
+</script><script type="module">import * as THREE from "three"; import { GeometryVideoLoader } from "gvpipe/three";
+window.begin = async (name) => {
+  const mesh = await new GeometryVideoLoader().setOptions({ ownClock: true }).loadAsync(name);
+  const renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
+  renderer.setSize(64, 64);
+  const camera = new THREE.OrthographicCamera(0, 1, 1, 0, -10, 10);
+  const scene = new THREE.Scene().add(mesh);
+  const gl = renderer.getContext();
+  const seen = [];
+  const draw = (frame) => {
+    renderer.render(scene, camera);
+    const pixel = new Uint8Array(4);
+    gl.readPixels(32, 32, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    seen.push([frame ?? Math.round(mesh.framePositions[2] * 10), ...pixel.slice(0, 3)]);
+  };
+  const seek = async (frames, isStill) => {
+    for (const k of frames) {
+      await mesh.seek(k);
+      draw(isStill ? k : undefined);
+    }
+  };
+  const play = (isStill) => {
+    mesh.addEventListener("frame", ({ frame }) => draw(isStill ? frame : undefined));
+    return mesh.play();
+  };
+  const jump = (time) => {
+    mesh.currentTime = time;
+    return new Promise((resolve) => mesh.addEventListener("seeked", resolve, { once: true }));
+  };
+  const end = () => {
+    mesh.pause();
+    const { notes } = mesh;
+    mesh.dispose();
+    renderer.dispose();
+    return JSON.stringify([seen, notes]);
+  };
+  return { mesh, draw, seek, play, jump, end };
+};</script>"""
+START = """const film = await window.begin(args[0]);
+    const rest = (ms) => new Promise((resolve) => setTimeout(resolve, ms));"""
 Run = Callable[..., Any]
 
 
@@ -83,7 +109,7 @@ def driver(name: str, folder: Path, tmp_path_factory: pytest.TempPathFactory) ->
 
 @pytest.fixture
 def page(driver: Any) -> Run:
-    return lambda body, *arguments: pages.run(driver, START + body, *arguments)
+    return lambda body, *arguments: json.loads(pages.run(driver, START + body, *arguments))
 
 
 def check(found: list[list[int]], frames: list[int] | None = None) -> None:
@@ -96,64 +122,35 @@ def check(found: list[list[int]], frames: list[int] | None = None) -> None:
 @pytest.mark.parametrize("film", ["pca.mp4", "stream.mp4", "mcgv.mp4"])
 def test_seeks(page: Run, film: str) -> None:
     frames = [0, 17, 5, 39, 38, 31, 32, 1, 0, 20]
-    found = page(
-        """const seen = [drawn()];
-        for (const k of args[1]) { await mesh.seek(k); seen.push(drawn()); }
-        const { notes } = mesh;
-        mesh.dispose(); renderer.dispose();
-        return [seen, notes];""",
-        film,
-        frames,
-    )
-    check(found[0], [0, *frames])
-    assert found[1] == []
+    seen, notes = page("film.draw(); await film.seek(args[1]); return film.end();", film, frames)
+    check(seen, [0, *frames])
+    assert notes == []
 
 
 @pytest.mark.parametrize("film", ["pca.mp4", "mcgv.mp4"])
 def test_play(page: Run, film: str) -> None:
-    """Twice through, with a jump between; every frame event is drawn at once."""
-    found = page(
-        """const seen = [];
-        mesh.addEventListener("frame", () => seen.push(drawn()));
-        mesh.loop = true;
-        await mesh.play();
-        await new Promise((resolve) => setTimeout(resolve, 2200));
-        await (mesh.currentTime = 1.2, new Promise((resolve) => mesh.addEventListener("seeked", resolve, { once: true })));
-        await new Promise((resolve) => setTimeout(resolve, 700));
-        mesh.pause();
-        mesh.dispose(); renderer.dispose();
-        return seen;""",
+    """Once through and on, with a jump; what each frame event announces is drawn at once."""
+    seen, _ = page(
+        """film.mesh.loop = true;
+        await film.play();
+        await rest(2200);
+        await film.jump(1.2);
+        await rest(700);
+        return film.end();""",
         film,
     )
-    check(found)
-    assert len({frame for frame, *_ in found}) > FRAMES / 4
+    check(seen)
+    assert len({frame for frame, *_ in seen}) > FRAMES / 4
 
 
 def test_a_mesh_that_stands_still_has_pictures_that_move(page: Run) -> None:
-    found = page(
-        """const seen = [];
-        for (const k of args[1]) { await mesh.seek(k); seen.push([k, ...drawn().slice(1)]); }
-        await mesh.seek(0);
-        mesh.addEventListener("frame", ({ frame }) => seen.push([frame, ...drawn().slice(1)]));
-        await mesh.play();
-        await new Promise((resolve) => setTimeout(resolve, 900));
-        mesh.dispose(); renderer.dispose();
-        return seen;""",
-        "still.mp4",
-        [3, 30, 29, 9],
-    )
-    check(found)
-    assert len(found) > 8
+    body = "await film.seek(args[1], true); await film.seek([0], true); await film.play(true); await rest(900); return film.end();"
+    seen, _ = page(body, "still.mp4", [3, 30, 29, 9])
+    check(seen)
+    assert len(seen) > 8
 
 
 def test_a_damaged_texture_leaves_the_mesh(page: Run) -> None:
-    found = page(
-        """const seen = [];
-        for (const k of [0, 35, 2]) { await mesh.seek(k); seen.push(drawn()); }
-        const { notes } = mesh;
-        mesh.dispose(); renderer.dispose();
-        return [seen, notes];""",
-        "damaged.mp4",
-    )
-    assert [frame for frame, *_ in found[0]] == [0, 35, 2] and found[0][1][1:] == [255, 255, 255]
-    assert any("moving texture" in note for note in found[1])
+    seen, notes = page("await film.seek([0, 35, 2]); return film.end();", "damaged.mp4")
+    assert [frame for frame, *_ in seen] == [0, 35, 2] and seen[1][1:] == [255, 255, 255]
+    assert any("moving texture" in note for note in notes)

@@ -13,16 +13,18 @@ const QUEUED = 4; // pictures that the decoder has not begun
 const HELD = 8; // pictures that it was given, and has not given back
 const SOON = 10; // ms
 const BYTES_PER_PIXEL = 4;
-const UNCHANGED = { imageOrientation: "none", premultiplyAlpha: "none", colorSpaceConversion: "none" };
 const KEPT_GROUPS = 2; // coded ones
 
 export class DecodedTrack {
   #decoder = null;
   #group = -1; // that the decoder is in
   #sample = 0; // of the group, that it is given next
+  #pending = new Set(); // pictures that it was given, and has not given back
+  #emitted = new Set(); // pictures of the group that it has given back
   #coded = new Map(); // group -> promise of its bytes
   #running = null;
-  #converting = 0;
+  #canvas = null;
+  #context = null;
   #error = null;
   #isClosed = false;
   #changed = () => {}; // ends a wait
@@ -79,7 +81,7 @@ export class DecodedTrack {
     }
   }
 
-  /** Give the decoder what it needs for a picture, and wait for it. */
+  /** Give the decoder what it needs for a picture, and wait for it, as long as it is of use. */
   async #decodeTo(picture) {
     const group = this.groupOf[picture];
     const samples = this.track.groups[group];
@@ -87,25 +89,20 @@ export class DecodedTrack {
     const isInside = this.#group === group && this.#pending.has(picture);
     if (!isAhead && !isInside) this.#open(group);
     const bytes = await this.#bytes(group);
-    while (!this.kept.has(picture)) {
+    while (this.kept.isOfUse(picture) && !this.#emitted.has(picture)) { // another may be wanted since
       this.#check();
       if (this.#sample < samples.length) {
         this.#give(samples[this.#sample++], bytes, samples[0]);
-        const isBusy = this.#decoder.decodeQueueSize > QUEUED || this.#converting > QUEUED || this.#pending.size > HELD;
+        const isBusy = this.#decoder.decodeQueueSize > QUEUED || this.#pending.size > HELD;
         if (isBusy) await this.#change();
       } else if (this.#pending.size) {
         await this.#decoder.flush().catch((error) => this.#fail(error));
-        while (this.#converting && !this.#error) await this.#change();
         this.#pending.clear();
-        this.#check();
-        if (!this.kept.has(picture)) throw this.#broken(`picture ${picture} is missing`);
       } else {
         throw this.#broken(`picture ${picture} is missing`);
       }
     }
   }
-
-  #pending = new Set(); // pictures that the decoder was given, and has not given back
 
   #give({ offset, size, picture }, bytes, first) {
     const start = offset - first.offset;
@@ -116,6 +113,7 @@ export class DecodedTrack {
 
   #open(group) {
     const isIdle = this.#group >= 0 && !this.#pending.size && this.#sample === this.track.groups[this.#group].length;
+    this.#emitted.clear();
     if (isIdle && this.#decoder.state === "configured") {
       [this.#group, this.#sample] = [group, 0];
       return;
@@ -132,10 +130,12 @@ export class DecodedTrack {
     this.#error = null;
   }
 
-  async #take(frame, decoder) {
+  #take(frame, decoder) {
     const picture = Math.round(frame.timestamp / TICK);
-    if (decoder === this.#decoder) this.#pending.delete(picture);
-    this.#converting++;
+    if (decoder === this.#decoder) {
+      this.#pending.delete(picture);
+      this.#emitted.add(picture);
+    }
     try {
       const [width, height] = this.size;
       const { visibleRect } = frame;
@@ -144,17 +144,23 @@ export class DecodedTrack {
         throw this.#broken(`it is ${visibleRect.width}x${visibleRect.height} pixels in place of ${width}x${height}`);
       }
       if (!this.#isClosed && this.kept.isOfUse(picture)) {
-        const bitmap = await createImageBitmap(frame, 0, 0, width, height, UNCHANGED);
-        if (this.#isClosed) bitmap.close();
-        else this.kept.add(picture, bitmap);
+        this.kept.add(picture, this.#drawn(frame));
       }
     } catch (error) {
       this.#fail(error);
     } finally {
       frame.close();
-      this.#converting--;
       this.#changed();
     }
+  }
+
+  /** A picture of its own, cut to the texture's size. Firefox uploads none that `createImageBitmap` cuts. */
+  #drawn(frame) {
+    const [width, height] = this.size;
+    this.#canvas ??= new OffscreenCanvas(width, height);
+    this.#context ??= this.#canvas.getContext("2d", { alpha: false });
+    this.#context.drawImage(frame, 0, 0, width, height, 0, 0, width, height);
+    return this.#canvas.transferToImageBitmap();
   }
 
   /** A group's coded pictures. */
@@ -181,6 +187,7 @@ export class DecodedTrack {
     this.#decoder = null;
     this.#group = -1;
     this.#pending.clear();
+    this.#emitted.clear();
   }
 
   #fail(error) {

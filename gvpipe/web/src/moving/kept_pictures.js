@@ -50,8 +50,8 @@ export class KeptPictures {
   }
 
   add(picture, bitmap) {
-    this.#kept.get(picture)?.close();
-    this.#kept.set(picture, bitmap);
+    if (this.#kept.has(picture)) bitmap.close(); // it was decoded twice
+    else this.#kept.set(picture, bitmap);
     for (const { resolve } of this.#waiting.get(picture) ?? []) resolve();
     this.#waiting.delete(picture);
   }
