@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from gvpipe.grids.cells import Cells
     from gvpipe.grids.volume import Volume
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
+    from gvpipe.media.sound import Sound
+    from gvpipe.media.sound_files import read_sound
     from gvpipe.metrics.comparison import Comparison
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
@@ -60,6 +62,7 @@ __all__ = [
     "Report",
     "Restreamed",
     "Skin",
+    "Sound",
     "Texture",
     "Volume",
     "compare",
@@ -73,6 +76,7 @@ __all__ = [
     "open",
     "open_live",
     "read",
+    "read_sound",
     "render",
     "restream",
     "skin",
@@ -93,6 +97,8 @@ _HOMES = {
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
     "gvpipe.playback.files": ("read", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
+    "gvpipe.media.sound": ("Sound",),
+    "gvpipe.media.sound_files": ("read_sound",),
     "gvpipe.metrics.comparison": ("Comparison",),
     "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),

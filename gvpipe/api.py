@@ -16,11 +16,14 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.moving_textures import MovingCoding
 from gvpipe.asset_coding.options import AssetOptions
+from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
+from gvpipe.asset_coding.sound_track import pack_sound
+from gvpipe.asset_coding.sound_track import read_sound as read_sound_track
 from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
 from gvpipe.coding.segment_memory import fit_segments
 from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
-from gvpipe.container.mp4 import bytes_by_part, read_file, write_file
+from gvpipe.container.mp4 import bytes_by_part, load, read_file, write_file
 from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
 from gvpipe.foundation import notes
 from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
@@ -28,12 +31,14 @@ from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
 from gvpipe.foundation.progress import Progress
+from gvpipe.media.sound import Sound
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.model.warp import warped
 from gvpipe.playback.files import Source, add_texture, frame_range, read
 from gvpipe.playback.player import Player
+from gvpipe.playback.sounds import AudioOptions, sound_beside, with_sound
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
 from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
 from gvpipe.rate_control.search import meet
@@ -72,6 +77,7 @@ class Report:
         notes: what a user should know, a line each.
         errors: ``rmse``, ``rmse_diag``, ``max``, ``max_diag`` and ``kg`` of the file, as in `Comparison`, where a target was
             given or codecs competed; else empty.
+        audio: as in `Info`.
     """
 
     codec: str
@@ -89,6 +95,7 @@ class Report:
     reason: str
     notes: list[str]
     errors: dict[str, float | None] = field(default_factory=dict)
+    audio: dict[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values."""
@@ -102,11 +109,13 @@ class Restreamed:
     Args:
         layout: of the file that it wrote: ``plain`` or ``stream``.
         bytes_before, bytes: of the source and of the file.
+        notes: what a user should know, a line each.
     """
 
     layout: str
     bytes_before: int
     bytes: int
+    notes: list[str] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """The same as JSON values."""
@@ -162,6 +171,10 @@ def encode(
     texture: StrPath | None = None,
     texture_quality: float | None = None,
     texture_codec: str | None = None,
+    audio: StrPath | Sound | bool | None = None,
+    audio_codec: str | None = None,
+    audio_bitrate: int | None = None,
+    audio_trim: bool = False,
     **settings: Any,
 ) -> Report:
     """Encode a sequence into a geometry video.
@@ -199,6 +212,10 @@ def encode(
             one for each core, once a minute of work is left and no ``memory`` is given; None: here.
         scheduler: code them on the Dask cluster of this address, such as ``"tcp://host:8786"``, whose workers read ``source``
             at the same path (extra ``cluster``).
+        audio: the file of a sound, or a `Sound`; second 0 is the source's first frame, and ``frames`` cut it too. None: the
+            source's own, of a geometry video; False: none.
+        audio_codec, audio_bitrate: of a file, as for `read_sound`.
+        audio_trim: let the sound end with the film, if not before.
 
     Raises:
         InputError: the source, a setting or the path cannot be used, no quality meets the target, or a worker cannot work.
@@ -209,6 +226,7 @@ def encode(
 
     check_video_target(path, "gvpipe.encode's path")
     _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
+    sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
     given = _candidates(codec, settings, purpose)
     is_shared = workers == AUTO_WORKERS and scheduler is None
     if workers == AUTO_WORKERS:
@@ -221,7 +239,7 @@ def encode(
     with open_executor(scheduler, workers) as executor:
         options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited, "real_time": real_time, "warp": warp}
         options["volume"] = volume
-        sequence = _open_source(source, path, fps, options)
+        sequence = with_sound(_open_source(source, path, fps, options), sounds, frames)
         sequence = sequence if texture is None else add_texture(sequence, texture, frames)
         if memory is not None:
             given = fit_segments(given, sequence.n_vertices, memory)
@@ -245,7 +263,8 @@ def encode(
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=[*_notes(sequence, target, asset.plan), *_refusal(path, bitstream, size)],
+        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *_refusal(path, bitstream, size)],
+        audio=None if asset.sound is None else asset.sound.to_json(),
         errors={} if coded.errors is None else dataclasses.asdict(coded.errors),
     )
 
@@ -273,11 +292,21 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
     images = tuple(image.part(start, stop) for image in whole.images)
-    return dataclasses.replace(whole, positions=positions, fields=fields, images=images)
+    return dataclasses.replace(whole, positions=positions, fields=fields, images=images, sound=whole.sound_of(start, stop))
 
 
-def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlimited: bool = False) -> Restreamed:
-    """Change the layout of a geometry video, without loss: sections and pictures stay as they are, to the bit.
+def restream(
+    source: StrPath,
+    path: StrPath,
+    layout: str | None = None,
+    *,
+    unlimited: bool = False,
+    audio: StrPath | Sound | bool | None = None,
+    audio_codec: str | None = None,
+    audio_bitrate: int | None = None,
+    audio_trim: bool = False,
+) -> Restreamed:
+    """Change the layout of a geometry video, without loss: sections, pictures and sound stay as they are, to the bit.
 
     The *stream* layout has an index first, then each segment's sections beside its pictures. It plays over HTTP while it
     loads, and a jump costs one segment. The *plain* layout is a little smaller. A file of the *bare* layout gets the poster
@@ -288,25 +317,42 @@ def restream(source: StrPath, path: StrPath, layout: str | None = None, *, unlim
         path: of the file to write.
         layout: ``"stream"`` or ``"plain"``; None: ``"stream"`` for plain and unfinished files, ``"plain"`` for others.
         unlimited: as for `open`.
+        audio, audio_codec, audio_bitrate, audio_trim: as for `encode`: another sound, or none; the layout then stays, unless
+            another is asked for.
 
     Raises:
-        InputError: no such file, or no such layout.
+        InputError: no such file, no such layout, or a sound that cannot be read.
         FormatError: not a geometry video, or a damaged one.
         OutputError: the file cannot be written; no part of it is left.
     """
     if layout not in (None, PLAIN, STREAM):
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
     check_video_target(path, "gvpipe.restream's path")
+    sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
     bitstream = read_file(check_path(source, "the geometry video"), unlimited)
-    chosen = layout or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
+    kept = bitstream.layout if not sounds.is_empty and bitstream.layout in (PLAIN, STREAM) else None
+    chosen = layout or kept or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
+    bitstream, said = _with_audio(bitstream, os.fspath(source), sounds)
     if bitstream.layout in (BARE, LIVE):  # which have no poster, or none that is read
         bitstream = dataclasses.replace(bitstream, is_bare=False)
         if not bitstream.video:
             with Player(source, unlimited=unlimited) as player:
                 bitstream = dataclasses.replace(bitstream, video=poster_of(player.sequence()), outline=player.outline())
     with in_file(os.fspath(source)):
+        bitstream = load(bitstream)
         size = write_file(bitstream, path, parts=segment_parts(bitstream) if chosen == STREAM else None)
-    return Restreamed(chosen, bitstream.n_bytes, size)
+    return Restreamed(chosen, bitstream.n_bytes, size, [*bitstream.lost, *said])
+
+
+def _with_audio(bitstream: Bitstream, name: str, sounds: AudioOptions) -> tuple[Bitstream, tuple[str, ...]]:
+    """A file's bitstream with the sound that is asked for, and what is said of it; ``name`` is the file's."""
+    if sounds.is_empty:
+        return bitstream, ()
+    others = tuple(each for each in bitstream.companions if each.kind != SOUND_KIND)
+    with in_file(name):
+        sound, said = sound_beside(read_sound_track(bitstream)[0], bitstream.n_frames / bitstream.fps, sounds)
+        own = () if sound is None else (pack_sound(sound),)
+    return dataclasses.replace(bitstream, companions=(*own, *others)), said
 
 
 def open(path: StrPath, *, unlimited: bool = False, shared: Callable[[str], bytes] | None = None) -> Player:

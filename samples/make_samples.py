@@ -2,7 +2,7 @@
 
 `cloth.npz` and `creature.npz` hold `vertices` (F, V, 3) float32 in metres, y up, `faces` (T, 3) int32,
 counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame. `flag.npz` has two parts, quads,
-uv with a texture, normals with hard edges, and a field.
+uv with a texture, normals with hard edges, and a field. `voice.wav` is a tune with a click at each second.
 
     python make_samples.py [OUTPUT_FOLDER]
 """
@@ -19,6 +19,7 @@ from bounce import make_bounce
 from cloth import make_cloth
 from creature import make_creature
 from flag import make_flag
+from voice import write_voice
 
 import gvpipe
 
@@ -43,6 +44,8 @@ def main() -> None:
     write_obj_frames(folder / "ball_frames", bounce)
     n_bytes = sum(file.stat().st_size for file in (folder / "ball_frames").glob("ball_*.obj"))
     report("ball_frames", bounce, n_bytes)
+    write_voice(folder / "voice.wav")
+    print(f"voice.wav: {(folder / 'voice.wav').stat().st_size / 1e3:.1f} kB")
 
 
 def write_npz(path: Path, animation: Animation) -> None:

@@ -21,7 +21,7 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """The names of ``make_samples.py``, whose modules are gone afterwards."""
     monkeypatch.syspath_prepend(str(SAMPLES))
     yield runpy.run_path(str(SAMPLES / "make_samples.py"))
-    for module in ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise"):
+    for module in ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise", "voice"):
         sys.modules.pop(module, None)
 
 
@@ -31,6 +31,12 @@ def test_ball_frames_are_what_the_script_makes(script: dict[str, Any], tmp_path:
     assert [path.name for path in made] == [f"ball_{i:04d}.obj" for i in range(1, 25)]
     for path in made:  # rounded on writing, so that other versions of numpy write the same
         assert path.read_bytes() == (SAMPLES / "ball_frames" / path.name).read_bytes()
+
+
+def test_the_voice_is_what_the_script_makes(script: dict[str, Any], tmp_path: Path) -> None:
+    script["write_voice"](tmp_path / "voice.wav")
+    assert (tmp_path / "voice.wav").read_bytes() == (SAMPLES / "voice.wav").read_bytes()
+    assert (SAMPLES / "voice.wav").stat().st_size < 60_000
 
 
 @pytest.mark.parametrize("name", ["creature", pytest.param("cloth", marks=pytest.mark.slow)])

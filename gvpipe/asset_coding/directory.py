@@ -26,6 +26,7 @@ from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.asset_coding.moving_textures import read_moving
 from gvpipe.asset_coding.reduction import Reduction, read_reduction
+from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.asset_coding.times import SECTION as TIMES
 from gvpipe.asset_coding.times import unpack_times
 from gvpipe.container.bitstream import Bitstream
@@ -196,9 +197,10 @@ def is_known(listed: Listed) -> bool:
 def file_notes(directory: Directory, bitstream: Bitstream) -> tuple[str, ...]:
     """What a user should know of a file, a line each."""
     unfinished = (UNFINISHED,) if bitstream.is_unfinished else ()
+    _, silent = read_sound(bitstream)
     skipped = directory.skipped
     newer = f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(skipped)}"
-    return (*unfinished, *((printable(newer),) if skipped else ()), *bitstream.lost)
+    return (*unfinished, *((printable(newer),) if skipped else ()), *map(printable, (*bitstream.lost, *silent)))
 
 
 def vertex_starts(parts: tuple[Part, ...], n_vertices: int) -> Int64 | None:

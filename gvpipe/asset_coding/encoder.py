@@ -34,13 +34,13 @@ from gvpipe.asset_coding.directory import (
     vertex_starts,
 )
 from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
-from gvpipe.asset_coding.moving_textures import KIND as MOVING_KIND
 from gvpipe.asset_coding.moving_textures import code_moving
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
 from gvpipe.asset_coding.reduction import NO_REDUCTION, Reduction
 from gvpipe.asset_coding.scan import WHOLE_KINDS, are_whole, longest_vector
+from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
 from gvpipe.asset_coding.times import SECTION as TIMES
 from gvpipe.asset_coding.times import pack_times
 from gvpipe.asset_coding.volume_encoder import Shown, VolumeCoder
@@ -152,12 +152,14 @@ class AssetCoder:
         volume = sequence.volume
         kept = {**self.plan.attributes, **self.plan.fields}
         self._volume = None if volume is None else VolumeCoder(sequence, volume, options, kept)
+        self.sound, self.sound_notes = whole_sound(sequence.sound)
+        self._companions = () if self.sound is None else (pack_sound(self.sound),)
         self._fields: dict[tuple[str, bytes], bytes] = {}
         self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing beside positions and triangles."""
+        """Whether there is nothing beside positions, triangles and a sound."""
         given = self._sequence
         is_bare = not (self.plan.attributes or self.plan.fields or given.parts or given.materials or given.images)
         return is_bare and given.polygons is None and given.volume is None and _with_losses(given) == NO_METADATA
@@ -172,7 +174,7 @@ class AssetCoder:
                 bitstream.
         """
         if self.is_empty:
-            return encoded.bitstream
+            return dataclasses.replace(encoded.bitstream, companions=self._companions)
         reader, same_bits = open_reader(encoded.bitstream), codec.same_bits
         permutation = np.asarray(encoded.permutation, np.int64)
         place = np.empty(len(permutation), np.int32)
@@ -191,7 +193,6 @@ class AssetCoder:
             shown = Shown(permutation, reader, arrangement.faces, arrangement.polygons)
             reorder = bool(getattr(codec, "reorder", False))
             sections |= self._volume.sections(shown, sum(map(len, sections.values())), reorder, is_final)
-        others = tuple(each for each in encoded.bitstream.companions if each.kind != MOVING_KIND)
         metadata = _with_losses(self._sequence)
         if len(metadata.times) == encoded.bitstream.n_frames:
             sections[TIMES] = pack_times(metadata.times)
@@ -213,7 +214,7 @@ class AssetCoder:
             encoded.bitstream,
             sections={**sections, SECTION: pack_directory(directory, len(permutation))},
             outline=_with_counts(encoded.bitstream.outline, arrangement, len(parts)),
-            companions=(*others, *self._moving),
+            companions=(*self._companions, *self._moving),
         )
 
     @kept

@@ -12,6 +12,7 @@ from gvpipe.asset.listing import Things, list_things
 from gvpipe.asset.metadata import losses_of
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import VERSION, Directory, Listed, file_notes, read_images
+from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.asset_coding.volume_list import SECTION as VOLUME
 from gvpipe.asset_coding.volume_reader import read_volume_list
 from gvpipe.container.bitstream import Bitstream
@@ -42,8 +43,14 @@ def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> 
             for values, listed in zip(_listed(directory.fields, bitstream), directory.fields, strict=True)
         ],
         "volume": _volume(bitstream),
+        "audio": _audio(bitstream),
         "notes": list(file_notes(directory, bitstream)),
     }
+
+
+def _audio(bitstream: Bitstream) -> dict[str, Any] | None:
+    sound, _ = read_sound(bitstream)
+    return None if sound is None else sound.to_json()
 
 
 def _volume(bitstream: Bitstream) -> dict[str, Any] | None:

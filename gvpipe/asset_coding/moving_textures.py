@@ -17,11 +17,11 @@ import numpy as np
 from gvpipe.asset.material import MOVING, Image
 from gvpipe.asset.moving import Pictures, png_of
 from gvpipe.asset_coding.used_texels import used_texels
-from gvpipe.container.companion import Companion
+from gvpipe.container.companion import MOST, Companion
 from gvpipe.container.json_object import JsonObject
 from gvpipe.foundation.arrays import Bool, UInt8
 from gvpipe.foundation.budget import Budget
-from gvpipe.foundation.errors import SettingError
+from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.media.picture_reader import CodedPictures as CodedTrack
 from gvpipe.media.picture_reader import PictureReader, take_apart
 from gvpipe.media.picture_video import COPY, DEFAULT_QUALITY, READ, check_choice, codec_of, copy_pictures, encode_pictures
@@ -29,6 +29,7 @@ from gvpipe.media.texel_fill import TexelFill
 from gvpipe.model.sequence import MeshSequence
 
 KIND = "texture"  # of companions
+MOST_MOVING = MOST - 1  # images: one companion may be a sound
 DEFAULT_CODEC = "h264"
 MAX_SIDE, MAX_FRAMES, MAX_IMAGES = 16384, 1 << 24, 1 << 16
 
@@ -95,7 +96,10 @@ def code_pictures(pictures: Pictures, fps: float, coding: MovingCoding, used: Bo
 
 
 def code_moving(images: Sequence[Image], sequence: MeshSequence, coding: MovingCoding) -> tuple[Companion, ...]:
-    """Return a companion for each moving image of a sequence."""
+    """Return a companion for each moving image of a sequence; raises `InputError` if there are too many."""
+    n_moving = sum(image.is_moving for image in images)
+    if n_moving > MOST_MOVING:
+        raise InputError(f"{sequence.name} has {n_moving} moving textures; a file holds {MOST_MOVING}, so leave some out")
     companions = []
     for number, image in enumerate(images):
         if image.pictures is None:

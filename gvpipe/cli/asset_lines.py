@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from gvpipe.playback.video_info import Info
 
 MOST = 12  # names in a line
+SOON = 0.001  # seconds
 
 
 def shape_lines(info: Info | SourceInfo) -> Iterator[str]:
@@ -41,6 +42,11 @@ def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
     if (volume := getattr(info, "volume", None)) is not None:
         names = ", ".join([*volume["point_fields"], *volume["cell_fields"]]) or "no numbers"
         yield f"volume: {volume['cells']} cells, {volume['points']} inner points, {names}, {volume['bytes']} bytes"
+    if (audio := getattr(info, "audio", None)) is not None:
+        channels = f"{audio['channels']} channel" + ("s" if audio["channels"] != 1 else "")
+        start = f" from second {audio['start']:.4g} on" if audio["start"] >= SOON else ""
+        size = f"{audio['bytes']} bytes"
+        yield f"sound: {audio['codec']}, {channels}, {audio['rate']} Hz, {audio['seconds']:.4g} s{start}, {size}"
     about = dict(info.metadata)
     times, texts = about.pop("times"), about.pop("texts")
     said = {key: value for key, value in about.items() if value} | texts

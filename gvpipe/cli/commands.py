@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gvpipe import __version__
+from gvpipe.cli.audio_options import audio_options, parse_audio, sound_path, write_beside
 from gvpipe.cli.benchmarks import bench, plot
 from gvpipe.cli.console import Output, compress_option, is_verbose, output_options, texture_options, unlimited_option
 from gvpipe.cli.conversion import convert
@@ -86,6 +87,7 @@ def cli() -> None:
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
 @click.argument("target", metavar="OUTPUT.mp4")
 @encode_options
+@audio_options
 @click.option("--split", is_flag=True, help="Write a file for each run of frames with the same triangles: NAME-000.mp4, ...")
 @click.option(
     "--live",
@@ -124,7 +126,7 @@ def encode(
     from gvpipe import api
     from gvpipe.cli.choices import parse_texture
     from gvpipe.cli.process import give_back_memory
-    from gvpipe.cli.splitting import write_runs
+    from gvpipe.cli.splitting import with_sounds, write_runs
     from gvpipe.playback import files
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -144,18 +146,20 @@ def encode(
     if (workers is not None or scheduler is not None) and (split or PIPE in sources):
         message = "--workers and --scheduler read INPUT by its path, as a whole; leave out --split, and name no -"
         raise click.UsageError(message, click.get_current_context())
+    sound = parse_audio(options)
     asked = parse_encoding(options)
     give_back_memory()
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         if split:
             runs = files.read_runs(source, **asked.reading, unlimited=asked.unlimited)
+            runs = with_sounds(runs, sound, asked.reading["frames"])
             written = write_runs(
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
             )
         else:
             shared = "auto" if workers is None and PIPE not in sources else workers
-            keywords = {**asked.keywords, "workers": shared, "scheduler": scheduler, "texture": shown_by}
+            keywords = {**asked.keywords, **sound, "workers": shared, "scheduler": scheduler, "texture": shown_by}
             report = api.encode(source, path, asked.codec, progress, **keywords)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
@@ -175,6 +179,8 @@ def _encode_live(sources: tuple[str, ...], target: str, options: dict[str, Any],
 
     from gvpipe.cli.live_input import encode_live
 
+    if any(parse_audio(options).values()):
+        raise click.UsageError("--live writes no sound; add it later: gvpipe restream OUTPUT.mp4 NEW.mp4 --audio FILE")
     if any(options[name] not in (None, False, ()) for name in options.keys() - LIVE_OPTIONS):
         raise click.UsageError("--live knows --mesh, --fps, --codec, --quality, --segment, --reorder and --set alone")
     mesh, fps, codec = (options[name] for name in ("mesh", "fps", "codec"))
@@ -217,6 +223,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
 @click.option("--lod", type=int, default=0, show_default=True, help="Level of detail: 0 the mesh, higher is coarser.")
 @click.option("--local", is_flag=True, help="Leave out the origin of a mesh far from the world's: float32 positions near 0.")
 @click.option("--skin/--no-skin", default=None, help="Of a .glb or USD: a skeleton or none. [default: of a .glb if exact]")
+@click.option("--audio-out", metavar="FILE", help="Where the sound goes: .m4a, .wav or none. [default: OUTPUT's name, .m4a]")
 @compress_option
 @click.option("--texture-out", metavar="FILE.mp4", help="Write the textures that move as videos, too, as they are coded.")
 @unlimited_option
@@ -232,6 +239,7 @@ def decode(
     lod: int,
     local: bool,
     skin: bool | None,
+    audio_out: str | None,
     compress: str,
     texture_out: str | None,
     unlimited: bool,
@@ -241,7 +249,7 @@ def decode(
 
     OUTPUT is an .npz, a scene (.glb, .usdc, .usda, .usdz, .abc), a point cache (.pc2, .mdd, .npy), .pvd, .vtkhdf, a
     folder of vertex animation textures (.openvat), or a pattern of frame files such as out/%04d.obj (also .ply, .stl, .off,
-    .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input.
+    .glb, .vtp), or - for an .npz on standard output. FILE - is a geometry video on standard input. The sound goes beside it.
     """
     from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
@@ -249,11 +257,15 @@ def decode(
     from gvpipe.cli.skeletons import check_glb_options, skin_of_video
     from gvpipe.foundation import notes
     from gvpipe.io.writing import takes_skin
+    from gvpipe.media.sound_files import check_sound_target
     from gvpipe.playback import files
     from gvpipe.playback.texture_files import write_tracks
 
     out = out.carrying(target)
     check_glb_options(target, skin is True, compress)
+    sound_target = sound_path(target, source, audio_out)
+    if audio_out is not None and sound_target is not None:
+        check_sound_target(sound_target)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
         player = api.open(given, unlimited=unlimited)
@@ -262,7 +274,10 @@ def decode(
         sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
         found, said = skin_of_video(player, path, (start, stop), skin, is_whole=not parts and not lod)
         tracks = write_tracks(player, texture_out) if texture_out else []
-        noticed = [*said, *files.write(sequence.local() if local else sequence, path, start, found, compress)]
+        silent = sequence.with_sound(None)
+        noticed = [*said, *files.write(silent.local() if local else silent, path, start, found, compress)]
+        sound, heard = write_beside(sequence, sound_target, audio_out)
+    noticed += heard + [note for note in player.bitstream.lost if note not in noticed]
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
     noticed += [UNFINISHED] if player.bitstream.is_unfinished and UNFINISHED not in noticed else []
@@ -272,6 +287,7 @@ def decode(
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
     values |= {"textures": tracks} if tracks else {}
     values |= {"joints": found.joints if found else 0} if takes_skin(str(target)) else {}
+    values |= {"audio": {"output": sound_target, **sound.to_json()}} if sound else {}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})
     shape = notes.shape(stop - start, sequence.n_vertices)
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({shape})")
@@ -281,18 +297,22 @@ def decode(
 @click.argument("source", metavar="FILE.mp4")
 @click.argument("target", metavar="OUTPUT.mp4")
 @click.option("--layout", type=click.Choice(["stream", "plain"]), help="Of OUTPUT. [default: plain, unless FILE has it]")
+@audio_options
 @unlimited_option
 @output_options
-def restream(source: str, target: str, layout: str | None, unlimited: bool, out: Output) -> None:
+def restream(source: str, target: str, layout: str | None, unlimited: bool, out: Output, **options: Any) -> None:
     """Change the layout of a geometry video, without loss, to the one that plays over HTTP while it loads, or back.
 
-    FILE may be an address (https://...), or - for standard input. OUTPUT - is standard output.
+    FILE may be an address (https://...), or - for standard input. OUTPUT - is standard output. With --audio or --no-audio
+    the sound alone changes, unless --layout is given.
     """
     from gvpipe import api
 
     with source_path(source) as given, target_path(target, ".mp4") as path, out.progress():
-        done = api.restream(given, path, layout, unlimited=unlimited)
+        done = api.restream(given, path, layout, unlimited=unlimited, **parse_audio(options))
     out = out.carrying(target)
+    for note in done.notes:
+        out.note(note)
     out.json({"output": shown(target, STDOUT), **done.to_json()})
     sizes = f"{_size(done.bytes_before)} -> {_size(done.bytes)}"
     out.text(f"{shown(source, STDIN)} -> {shown(target, STDOUT)} ({done.layout} layout, {sizes})")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from gvpipe.foundation.atomic import atomic_files
 from gvpipe.foundation.errors import InputError, OutputError
@@ -50,6 +50,23 @@ def write_runs(runs: Sequence[Run], target: str, write: Callable[[Run, Path], Re
 
             join_lists([temporary / own for own in names], temporary / name)
     return results
+
+
+def with_sounds(runs: Sequence[Run], sound: dict[str, Any], frames: tuple[int, int | None] | None) -> list[Run]:
+    """Give each run its part of a sound; ``sound`` and ``frames`` are keywords of `gvpipe.encode`."""
+    from gvpipe.playback.sounds import AudioOptions, sound_beside
+
+    options = AudioOptions(sound["audio"], sound["audio_codec"], sound["audio_bitrate"])
+    whole, _ = sound_beside(None, 0.0, options)
+    if options.audio is None and not sound["audio_trim"]:
+        return list(runs)
+    given = []
+    for run in runs:
+        fps = run.sequence.fps
+        own = run.sequence.sound if options.audio is None else whole and whole.part(run.start / fps, run.stop / fps)
+        trimmed = own and sound["audio_trim"] and own.part(0, len(run.sequence) / fps)
+        given.append(replace(run, sequence=run.sequence.with_sound(trimmed or own)))
+    return given
 
 
 def is_list(target: str) -> bool:

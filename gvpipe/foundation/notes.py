@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 ROUNDED = 1e-5  # part of the diagonal: what float32 may round without a word
 DEFAULT_FPS = 30.0
 MOST_NAMED = 12  # names in a note
+MUCH_SOUND = 0.1  # seconds between the ends of a sound and of its film: what is said
 ASSUMED_FPS = f"the input has no frame rate; {DEFAULT_FPS:g} frames per second were assumed (fps, --fps)"
 
 
@@ -79,6 +80,23 @@ def left_behind(names: Sequence[str]) -> tuple[str, ...]:
 def over_budget(reason: str) -> str:
     """The note for a file that is refused because it is very small for what it holds."""
     return f"the file is so small for its mesh that reading it needs --unlimited ({reason})"
+
+
+def sound_left_out(reason: str) -> str:
+    """The note for a sound that is damaged."""
+    return f"the sound is left out: {reason}"
+
+
+SOUND_ELSEWHERE = "the sound has ended before these frames, or begins after them; the file has none"
+
+
+def sound_and_film(stop: float, film: float) -> tuple[str, ...]:
+    """The note for a sound that ends at another time than the film, seconds."""
+    if stop > film + MUCH_SOUND:
+        return (f"the sound goes on for {stop - film:.3g} s after the film; players stop there (--audio-trim cuts it)",)
+    if stop < film - MUCH_SOUND:
+        return (f"the sound ends {film - stop:.3g} s before the film, which goes on in silence",)
+    return ()
 
 
 def coarser_level(lod: int, names: Sequence[str]) -> tuple[str, ...]:

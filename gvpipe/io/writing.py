@@ -75,6 +75,9 @@ def write(
     suffix = Path(path).suffix.lower()
     if compress not in COMPRESSIONS:
         raise SettingError(f"compress is {show(compress)}; {' or '.join(map(repr, COMPRESSIONS))} is needed")
+    if sequence.sound is not None:
+        left = "the sound is left out, for which mesh files have no place; gvpipe decode writes it beside them"
+        return (*write(sequence.with_sound(None), path, start, skin, compress), left)
     is_packed = compress != "none"
     if is_packed and not is_glb(path):
         raise InputError(f"{path}: a compressed file is one .glb; give such a name, or leave the compression out")

@@ -58,6 +58,7 @@ def add_asset(level: MeshSequence, whole: MeshSequence, points: Int32, kept: Int
         materials=materials,
         images=whole.images if any(material.textures for material in materials) else (),
         metadata=whole.metadata,
+        sound=whole.sound,
         notes=(*whole.notes, *coarser_level(lod, lost)),
     )
 

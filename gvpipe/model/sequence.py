@@ -30,6 +30,7 @@ from gvpipe.foundation.arrays import Array, Float32, Float64, Floats, Frames, In
 from gvpipe.foundation.errors import InputError, printable
 from gvpipe.foundation.notes import ASSUMED_FPS, count, show_origin
 from gvpipe.grids.volume import Volume
+from gvpipe.media.sound import Sound
 from gvpipe.model.frame_views import Guarded, Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.model.origin import as_origin, choose_origin, narrow, rounding
 
@@ -41,6 +42,7 @@ BARE: dict[str, Any] = {
     "materials": (),
     "images": (),
     "volume": None,
+    "sound": None,
 }
 CHUNK_BYTES = 4 << 20  # positions handed out at a time by `chunks`: large enough to vectorise, small beside any budget
 
@@ -71,6 +73,7 @@ class MeshSequence:
         metadata: up axis, unit, start time, source, texts.
         not_carried: what the source has and the sequence has not, by name.
         volume: what lies inside of the surface, of a simulation.
+        sound: what is heard with it (`gvpipe.read_sound`); second 0 is frame 0.
 
     Raises:
         InputError: a wrong shape, no frame, no vertex, an index out of range, an fps that is not a positive number, a
@@ -103,6 +106,7 @@ class MeshSequence:
     metadata: Metadata = NO_METADATA
     not_carried: tuple[str, ...] = ()
     volume: Volume | None = None
+    sound: Sound | None = None
     _exact: Frames | None = field(default=None, init=False)  # absolute; what float32 rounded
     _rounding: float = field(default=0.0, init=False)
 
@@ -137,6 +141,8 @@ class MeshSequence:
                 check_text(name, f"a name of {what}")
         if not isinstance(self.metadata, Metadata):
             raise TypeError(f"metadata is {show(self.metadata)}; a gvpipe.Metadata is needed")
+        if self.sound is not None and not isinstance(self.sound, Sound):
+            raise TypeError(f"sound is {show(self.sound)}; a gvpipe.Sound is needed, as of gvpipe.read_sound")
         for image in self.images:
             if not isinstance(image, Image):
                 raise TypeError(f"an image is {show(image)}; a gvpipe.Image is needed")
@@ -295,7 +301,13 @@ class MeshSequence:
         volume = None if self.volume is None else self.volume.part(start, stop)
         images = tuple(image.part(start, stop) for image in self.images)
         beside: dict[str, Any] = {"fields": fields, "images": images, "metadata": metadata, "volume": volume}
+        beside["sound"] = self.sound_of(start, stop)
         return self._derived(Span(self.read, start, *size), exact, **beside)
+
+    def sound_of(self, start: int, stop: int) -> Sound | None:
+        """What is heard with frames ``start`` to ``stop``; with the last one, all that follows."""
+        end = None if stop >= self.n_frames else stop / self.fps
+        return None if self.sound is None else self.sound.part(start / self.fps, end)
 
     def local(self) -> MeshSequence:
         """Return the sequence with its origin left out: the same float32 positions, relative to nothing."""
@@ -312,6 +324,10 @@ class MeshSequence:
         """Return the sequence with other materials and images, and with other parts if they are given."""
         shown = self.parts if parts is None else parts
         return self._derived(self.positions, self._exact, materials=materials, images=images, parts=shown)
+
+    def with_sound(self, sound: Sound | None, notes: tuple[str, ...] = ()) -> MeshSequence:
+        """Return the sequence with another sound or none, and more notes."""
+        return self._derived(self.positions, self._exact, sound=sound, notes=(*self.notes, *notes))
 
     def watched(self, told: Callable[[int], None]) -> MeshSequence:
         """Return the same sequence, which calls ``told`` with the frame after the last of those that are read, for progress."""

@@ -19,6 +19,7 @@ from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset_coding.directory import Directory, file_notes
 from gvpipe.asset_coding.reader import AssetReader
+from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.coding.codec import GroupReader, LevelReader
 from gvpipe.coding.registry import codec_class, codec_ids, open_reader, read_skin
 from gvpipe.container.bitstream import Bitstream
@@ -30,6 +31,7 @@ from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
 from gvpipe.grids.volume import Volume
+from gvpipe.media.sound import Sound
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
 from gvpipe.model.skin import Skin
@@ -136,6 +138,11 @@ class Player:
             return self._asset.volume
 
     @property
+    def sound(self) -> Sound | None:
+        """What is heard with the frames, None if the file has none; its samples are read when they are asked for."""
+        return read_sound(self.bitstream)[0]
+
+    @property
     def times(self) -> Float64:
         """``(F,) float64`` seconds of the frames, as `MeshSequence.times`."""
         return self.metadata.frame_times(len(self), self.fps)
@@ -234,6 +241,7 @@ class Player:
             images=self.images,
             metadata=self.metadata,
             volume=self.volume,
+            sound=self.sound,
         )
 
     def __len__(self) -> int:

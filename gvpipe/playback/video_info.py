@@ -39,6 +39,7 @@ class Info:
         images: name, media type, width, height and bytes.
         metadata: up axis, unit, start time, source, texts.
         volume: of what lies inside of the surface: cells, inner points, the bound on these, names of numbers, bytes; or None.
+        audio: codec, channels, rate, seconds, start (seconds after frame 0) and bytes of the sound; or None.
         not_carried: what the source had beside what the file carries.
         notes: what a user should know, a line each.
     """
@@ -65,6 +66,7 @@ class Info:
     images: list[dict[str, Any]]
     metadata: dict[str, Any]
     volume: dict[str, Any] | None
+    audio: dict[str, Any] | None
     not_carried: list[str]
     notes: list[str]
 

@@ -648,7 +648,7 @@ def test_restream_goes_both_ways(run: Run, video: Path, tmp_path: Path) -> None:
     assert ended.status == 0 and "stream layout" in ended.out and ended.out.count("\n") == 1
     values = one_object(run("restream", stream, back, "--json").out)
     size, before = video.stat().st_size, stream.stat().st_size
-    assert values == {"output": str(back), "layout": "plain", "bytes_before": before, "bytes": size}
+    assert values == {"output": str(back), "layout": "plain", "bytes_before": before, "bytes": size, "notes": []}
     assert back.read_bytes() == video.read_bytes()
     assert one_object(run("info", stream, "--json").out)["layout"] == "stream"
     assert run("info", stream).out.splitlines()[0].endswith(", stream layout")

@@ -42,7 +42,7 @@ def click(at: float, seconds: float = 1.0) -> bytes:
 
 def loudest(file: bytes | Path) -> float:
     """When the first sound track of a file is loudest, seconds."""
-    with av.open(io.BytesIO(file) if isinstance(file, bytes) else str(file)) as container:
+    with av.open(io.BytesIO(file) if isinstance(file, bytes) else str(file), "r") as container:
         frames = [frame.to_ndarray()[0] for frame in container.decode(audio=0)]
     return float(np.abs(np.concatenate(frames)).argmax()) / RATE
 
