@@ -70,6 +70,44 @@ class FilePictures:
                 return opened.has_transparency_data and bool(np.asarray(opened.convert("RGBA"))[:, :, 3].min() < 255)
 
 
+class BytesPictures:
+    """Pictures whose files are in memory (`Pictures`).
+
+    Args:
+        files: media type and bytes, one for each frame.
+        start: number of the first frame, for messages.
+
+    Raises:
+        InputError: one is no picture, or has another size than the first; the message names the frame.
+    """
+
+    def __init__(self, files: Sequence[tuple[str, bytes]], start: int = 0) -> None:
+        self._files = list(files)
+        sizes = [image_size(data) for _, data in self._files]
+        for frame, size in enumerate(sizes):
+            if size is None or size != sizes[0]:
+                found = "is no picture that can be opened" if size is None else f"has {size[0]}x{size[1]} pixels"
+                raise InputError(f"the picture of frame {start + frame} {found}; {ONE_SIZE}")
+        assert sizes[0] is not None
+        self._size = sizes[0]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self._size
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    def file(self, frame: int) -> tuple[str, bytes]:
+        """As of `Pictures`."""
+        return self._files[frame]
+
+    def pixels(self, frame: int) -> UInt8:
+        """As of `Pictures`; alpha is left out."""
+        return _pixels(self._files[frame][1], Path(f"the picture of frame {frame}"), self._size)
+
+
 def _size(path: Path, frame: int) -> tuple[int, int]:
     """Of a picture, from its head; raises `InputError` that names the frame."""
     try:

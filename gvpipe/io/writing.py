@@ -22,8 +22,8 @@ USD_SKIN_WRITER = late("usd.writer", "write_usd")
 GLB_WRITER = late("gltf", "write_animated")
 VTU_WRITER = late("simulation.vtu_writer", "write_vtu")
 HOLD_VOLUMES = (".vtu", ".pvd", ".vtkhdf", ".xdmf")
-HOLD_MOVING = (".obj", "")
-HOLD_PICTURES = (".npz", ".glb", ".gltf", ".ply", ".openvat", *USD)
+HOLD_MOVING = (".obj", "", *USD)
+HOLD_PICTURES = (".npz", ".glb", ".gltf", ".ply", ".openvat")
 STILL = "{} has no textures that move: each shows the picture of its first frame; --texture-out writes them as a video"
 COMPRESSIONS = ("none", "meshopt")
 

@@ -20,12 +20,15 @@ class MaterialWriter:
         sequence: with materials and images.
         scope: path of the prim that holds them.
         folder: of the images, relative to the stage.
-        names: of the images' files.
+        names: of the images' files: one, or one for each frame.
+        start: time code of the first frame.
     """
 
-    def __init__(self, stage: Any, sequence: MeshSequence, scope: str, folder: str, names: list[str]) -> None:
-        self._stage, self._sequence, self._scope = stage, sequence, scope
-        self._files = [f"./{folder}/{name}" for name in names]
+    def __init__(
+        self, stage: Any, sequence: MeshSequence, scope: str, folder: str, names: list[list[str]], start: float = 0.0
+    ) -> None:
+        self._stage, self._sequence, self._scope, self._start = stage, sequence, scope, start
+        self._files = [[f"./{folder}/{name}" for name in each] for each in names]
         self._written: dict[int, Any] = {}
         self._taken: set[str] = set()
 
@@ -108,7 +111,10 @@ class MaterialWriter:
         if shader.GetIdAttr().Get():
             return shader
         shader.CreateIdAttr("UsdUVTexture")
-        shader.CreateInput("file", types.Asset).Set(Sdf.AssetPath(self._files[texture.image]))
+        files, given = self._files[texture.image], shader.CreateInput("file", types.Asset)
+        given.Set(Sdf.AssetPath(files[0]))
+        for frame, file in enumerate(files if len(files) > 1 else ()):
+            given.Set(Sdf.AssetPath(file), self._start + frame)
         shader.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if "Color" in shared else "raw")
         for axis, wrap in zip(("wrapS", "wrapT"), texture.wrap, strict=True):
             shader.CreateInput(axis, types.Token).Set(WRAPS[wrap])

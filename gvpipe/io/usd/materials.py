@@ -7,6 +7,7 @@ metallic-roughness model; they are named as what is not carried.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ class Materials:
 
     def __init__(self, stage: Any, path: Path) -> None:
         self.textures = Textures(path)
+        self.times: Sequence[float] = ()  # time codes of the frames, for textures that move
         self.materials: list[Material] = []
         self.plain: list[str] = []  # materials without UsdPreviewSurface
         self.left = LeftBehind()
@@ -165,7 +167,8 @@ class Materials:
         wrap = tuple(WRAPS.get(str(_value(shader, axis)), "repeat") for axis in ("wrapS", "wrapT"))
         scale = _value(shader, "scale")
         factors = tuple(float(x) for x in scale) if scale is not None else (1.0, 1.0, 1.0, 1.0)
-        return self.textures.read(_value(shader, "file"), output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
+        assets = _values(shader, "file", self.times)
+        return self.textures.read(assets, output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
 
 
 def _shows_colors(surface: Any, name: str) -> bool:
@@ -218,6 +221,18 @@ def _connected(shader: Any, name: str) -> tuple[Any, str]:
         if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Output:
             return UsdShade.Shader(attribute.GetPrim()), UsdShade.Utils.GetBaseNameAndType(attribute.GetName())[0]
     return None, ""
+
+
+def _values(shader: Any, name: str, times: Sequence[float]) -> list[Any]:
+    """The values of an input at some times; one where they are the same, or there is none."""
+    from pxr import UsdShade
+
+    given = shader.GetInput(name)
+    for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given else ():
+        is_input = UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Input
+        if is_input and attribute.ValueMightBeTimeVarying() and len(times) > 1:
+            return [attribute.Get(float(time)) for time in times]
+    return [_value(shader, name)]
 
 
 def _value(shader: Any, name: str) -> Any:

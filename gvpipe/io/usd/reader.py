@@ -69,6 +69,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     times, fps, time_notes = stage_times(stage, samples, options, where)
     first, stop = options.span(len(times), where)
     times = times[first:stop]
+    materials.times, materials.textures.first = times.tolist(), first
     if float(times[0]) != start:  # meshes may have other vertices then
         motions = [moved(number, float(times[0])) for number in kept]
     frames = SceneFrames(motions, times, where, "time code", first, [layer.realPath for layer in stage.GetUsedLayers()])

@@ -5,6 +5,7 @@ Positions are in world space. Nodes above the meshes are written as transforms t
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 from dataclasses import replace
@@ -29,6 +30,7 @@ from gvpipe.io.usd.skin_writer import is_first_frame, write_skeleton
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
+FRAME_DIGITS = 4  # at least, in names of pictures of frames
 ROOT = "root"  # of meshes that have no common node
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
@@ -73,7 +75,7 @@ def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tup
             package = folder / "package.usdz"
             writer = zip_writer.CreateNew(str(package))
             writer.AddFile(str(stage), f"{identifier(path.stem)}.usdc")
-            for name in image_names(sequence):
+            for name in itertools.chain.from_iterable(image_names(sequence)):
                 writer.AddFile(str(folder / "textures" / name), f"textures/{name}")
             writer.Save()
             del writer
@@ -103,7 +105,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     stage.SetDefaultPrim(top)
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
-    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence))
+    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence), start)
     normals = SceneNormals(sequence, "USD")
     attributes = {name: each for name, each in normals.attributes.items() if name not in normals.fields}
     names = primvar_names({**attributes, **normals.fields})
@@ -258,18 +260,21 @@ def _paths(meshes: list[ExportMesh]) -> list[str]:
     return result
 
 
-def image_names(sequence: MeshSequence) -> list[str]:
-    """A file name for each image, none twice and none with a folder."""
+def image_names(sequence: MeshSequence) -> list[list[str]]:
+    """File names of each image: one, or one for each frame; none twice and none with a folder."""
     endings = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp", "image/x-exr": ".exr"}
-    result: list[str] = []
+    result: list[list[str]] = []
+    taken: set[str] = set()
     for number, image in enumerate(sequence.images):
         plain = Path(os.path.basename(image.name.replace("\\", "/")) or f"image{number}")
-        ending = endings.get(image.media_type, plain.suffix)
+        ending = endings.get(image.frame(0).media_type, plain.suffix)
         stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in plain.stem) or f"image{number}"
-        name, count = f"{stem}{ending}", 1
-        while name in result:
-            name, count = f"{stem}_{count}{ending}", count + 1
-        result.append(name)
+        marks = [""] if not image.is_moving else [f"_{frame:0{FRAME_DIGITS}d}" for frame in range(sequence.n_frames)]
+        free, count = stem, 1
+        while taken & {f"{free}{mark}{ending}" for mark in marks}:
+            free, count = f"{stem}_{count}", count + 1
+        result.append([f"{free}{mark}{ending}" for mark in marks])
+        taken |= set(result[-1])
     return result
 
 
@@ -280,9 +285,10 @@ def _write_images(sequence: MeshSequence, folder: Path) -> None:
         folder.mkdir(exist_ok=True)
     except OSError as exc:
         raise OutputError(f"cannot write {folder}: {exc.strerror}; choose another folder") from exc
-    for name, image in zip(image_names(sequence), sequence.images, strict=True):
-        with unnamed_path(folder / name) as temporary:
-            temporary.write_bytes(image.data)
+    for names, image in zip(image_names(sequence), sequence.images, strict=True):
+        for frame, name in enumerate(names):
+            with unnamed_path(folder / name) as temporary:
+                temporary.write_bytes(image.frame(frame).data)
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh], has_skin: bool) -> tuple[str, ...]:
