@@ -13,6 +13,7 @@ import os
 import shutil
 import subprocess
 import threading
+import time
 import warnings
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -61,18 +62,47 @@ def missing(name: str = "chromium") -> str:
 
 
 @contextlib.contextmanager
+def sound_server(folder: Path) -> Iterator[dict[str, str]]:
+    """Environment variables that let Firefox play sound which nobody hears; none without PulseAudio."""
+    program = shutil.which("pulseaudio")
+    if program is None:
+        yield {}
+        return
+    socket = folder / "pulse"
+    modules = ["--load=module-null-sink", f"--load=module-native-protocol-unix auth-anonymous=1 socket={socket}"]
+    options = ["-n", "--daemonize=no", "--use-pid-file=no", "--exit-idle-time=-1", "--disallow-exit", *modules]
+    home = {**os.environ, "HOME": str(folder), "XDG_RUNTIME_DIR": str(folder), "PULSE_RUNTIME_PATH": str(folder)}
+    process = subprocess.Popen([program, *options], env=home, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(100):
+            if socket.exists():
+                break
+            time.sleep(0.05)
+        yield {"PULSE_SERVER": f"unix:{socket}"}
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextlib.contextmanager
 def browser(
-    name: str, profile: Path, size: tuple[int, int] = (700, 700), h264: bool = True, compiles: bool = False
+    name: str,
+    profile: Path,
+    size: tuple[int, int] = (700, 700),
+    h264: bool = True,
+    compiles: bool = False,
+    more: dict[str, str] | None = None,
 ) -> Iterator[Any]:
     """A running browser of `NEEDS` with a new profile in the folder given: a Selenium driver, or what `Firefox` has of one.
 
     Args:
         size: of its window, pixels.
         h264: whether it may decode H.264; all but Chromium can do without.
+        more: environment variables, such as those of a `sound_server`; not for Chromium.
         compiles: whether WebKit may compile WebAssembly, for measures of time.
     """
     with contextlib.nullcontext("") if name == "chromium" else _display(size) as display:
-        environment = {**os.environ, "DISPLAY": display}
+        environment = {**os.environ, "DISPLAY": display, **(more or {})}
         if name == "chromium":
             driver = _chromium(profile, size)
         elif name == "firefox":

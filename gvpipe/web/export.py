@@ -151,6 +151,7 @@ def export_html(
         camera=camera,
         shading=shading,
     )
+    view = replace(view, muted=any(each.sound is not None for each in (player, *pieces)))
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
         report = _write_page(player.path, _as_it_is(player), target, up, view, [_as_it_is(piece) for piece in pieces])

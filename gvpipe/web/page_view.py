@@ -37,6 +37,7 @@ class PageView:
         warp: ``NAME`` or ``NAME:SCALE`` of a field that moves vertices, or None.
         camera: azimuth and elevation, degrees, or None for the player's own.
         shading: one of `gvpipe.rasterizer.renderer.SHADINGS`.
+        muted: whether it is silent until its reader asks for the sound: browsers start silent films alone.
     """
 
     field: str | None = None
@@ -47,6 +48,7 @@ class PageView:
     warp: str | None = None
     camera: tuple[float, float] | None = None
     shading: str = SHADINGS[0]
+    muted: bool = False
 
     def attributes(self) -> str:
         """Attributes of the element, each with a space before it; nothing where all is as the player has it."""
@@ -60,7 +62,8 @@ class PageView:
             "camera": _numbers(self.camera),
             "shading": None if self.shading == SHADINGS[0] else self.shading,
         }
-        return "".join(f' {name}="{html.escape(value)}"' for name, value in values.items() if value is not None)
+        given = "".join(f' {name}="{html.escape(value)}"' for name, value in values.items() if value is not None)
+        return given + (" muted" if self.muted else "")
 
 
 def page_view(

@@ -157,10 +157,11 @@ export class DecodedPictures {
   /**
    * Play on from here, `rate` times as fast; calls `show(frame)` for each frame that is due, `ended()` at the end if it does
    * not loop, `failed(error)` if it cannot go on. `nextTick(tick)` has `tick(ms)` called at the next step of the clock;
+   * `clock(position)`, in frames since the start, may give another position in place of this clock's, as a sound does.
    * `ticked(ms, isThere)` is called then, with whether the frame that is due is there. It waits for a frame that is on its way, and
    * for more at the end of a file that is still written; `waits(isWaiting)` says so. Played from its last two clips on, it never falls behind them.
    */
-  async play({ show, ended, failed, nextTick = nextRepaint, ticked, waits }, rate, loop) {
+  async play({ show, ended, failed, nextTick = nextRepaint, ticked, waits, clock }, rate, loop) {
     const playing = (this.playing = {});
     let position = Math.max(0, this.shown); // frames since the start
     let since = Math.floor(position); // the frame shown last, or first
@@ -177,7 +178,7 @@ export class DecodedPictures {
       const step = Math.min(Math.max(0, now - (before ?? now)), LONGEST_STEP);
       const isLive = repeated.clip > 0;
       if (isLive && follows && this.frames - position > BEHIND * repeated.clip) position = this.frames - repeated.clip;
-      let next = position + (step * rate * this.fps) / 1000;
+      let next = clock?.(position) ?? position + (step * rate * this.fps) / 1000;
       before = now;
       const isAtEnd = isLive && next >= this.frames;
       if (isAtEnd) next = this.frames - EDGE;

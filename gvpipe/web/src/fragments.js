@@ -62,7 +62,8 @@ function readDefaults(view, start) {
   return { duration: next(0x8), size: next(0x10), flags: next(0x20) };
 }
 
-function listBoxes(view, position, end) {
+/** Boxes one after the other: kind, start and end of their contents. @throws {RangeError} one has an impossible size */
+export function listBoxes(view, position, end) {
   const boxes = [];
   while (position + 8 <= end) {
     const size = view.getUint32(position);

@@ -9,7 +9,8 @@
 import { NO_ASSET, readAsset, readCoarseAsset } from "./asset/asset.js";
 import { openCodec } from "./codecs.js";
 import { readContainer } from "./format/boxes.js";
-import { geometryAlone, placesInFile, readCompanions } from "./format/companions.js";
+import { placesInFile, readCompanions } from "./format/companion_parts.js";
+import { describedIn, describedSound, geometryOf, soundOf } from "./format/companions.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
@@ -27,6 +28,7 @@ const LATEST = 1000; // while clips come
 const IDLE = 5000; // while none does
 const TRIES = 5; // of a look that the server refuses
 const PATIENCE = 30_000; // ms, with an outage
+const DAMAGED_SOUND = "its sound is damaged, and is left out; get the file again from its source";
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
 export class GeometryVideo {
@@ -62,8 +64,9 @@ export class GeometryVideo {
       closing.signal.throwIfAborted();
       const payload = await readPayload(file ? readContainer(file) : parts.container);
       const repeated = readRepeatedFrames(payload);
-      const companions = file ? companionsOf(file, payload.header) : parts.companions(payload.header.container.companions);
-      reader = await openCodec(file ? (companions.length ? geometryAlone(file) : file) : parts, payload, repeated, level, closing.signal);
+      const described = describedIn(payload.header);
+      const companions = file ? companionsOf(file, described) : parts.companions(described);
+      reader = await openCodec(file ? geometryOf(file) : parts, payload, repeated, level, closing.signal);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
       closing.signal.throwIfAborted();
@@ -75,6 +78,7 @@ export class GeometryVideo {
       video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
       video.#companions = companions;
+      video.#findSound(file, source);
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       if (parts?.isGrowing) video.#watch(parts);
       return video;
@@ -108,9 +112,16 @@ export class GeometryVideo {
   #queueBeside = Promise.resolve();
   #wake = () => {}; // ends a wait for the next look
   #followers = new Set(); // of a file that is still written
+  #soundNotes = [];
+  #soundUrl = null; // to be revoked
 
   /** The frame that is shown first: 0; of a file that is still written, that where its latest clip begins. */
   startFrame = 0;
+  /**
+   * What is heard with it, or null: `{codec, channels, rate, seconds, start}`, of seconds after frame 0, and `url` of a file that
+   * browsers play.
+   */
+  sound = null;
   /** Called when frames have come to a file that is still written, and when it is finished. */
   grown = () => {};
   /** Called when it cannot be followed any longer, with the error. */
@@ -197,15 +208,15 @@ export class GeometryVideo {
    * @param {(positions: Float32Array, k: number) => void} show called for each frame; the array is used again for the next
    * @param {{rate?: number, loop?: boolean, ended?: () => void, failed?: (error: Error) => void,
    *   nextTick?: (tick: (now: number) => void) => void, ticked?: (now: number, isThere: boolean) => void,
-   *   waits?: (isWaiting: boolean) => void}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames
+   *   waits?: (isWaiting: boolean) => void, clock?: (position: number) => number|null}} [options] `rate` 1 is the video's own speed; `waits` is called when it waits for frames
    *   that are on their way or not yet written, and when it goes on; `failed` is called if a frame later on cannot be decoded; `nextTick` is a clock in place of the page's: it
-   *   calls `tick` at its next step, with ms; `ticked` is called at each step, with whether the frame that is due was there
+   *   calls `tick` at its next step, with ms; `clock` may give another position, in frames, in place of what the time makes of it; `ticked` is called at each step, with whether the frame that is due was there
    * @throws {DOMException} NotSupportedError: no browser plays at this rate; AbortError: the video is closed
    */
-  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked, waits } = {}) {
+  async play(show, { rate = 1, loop = false, ended = () => {}, failed = () => {}, nextTick, ticked, waits, clock } = {}) {
     checkRate(rate);
     await this.#queue;
-    this.#playing = { show, ended, failed, nextTick, ticked, waits, rate, loop };
+    this.#playing = { show, ended, failed, nextTick, ticked, waits, clock, rate, loop };
     await this.#start();
   }
 
@@ -290,6 +301,7 @@ export class GeometryVideo {
     this.#moving?.close();
     this.#reader.close();
     this.#closeFile();
+    if (this.#soundUrl) URL.revokeObjectURL(this.#soundUrl);
   }
 
   /** Look for frames that come, until the end is there: a few times per clip, and seldom while nothing comes. */
@@ -361,6 +373,21 @@ export class GeometryVideo {
     return this.#asset;
   }
 
+  /** What is heard: of a file in memory a file of its own, else the track of the file that the browser fetches. */
+  #findSound(file, source) {
+    const { header } = this.#payload;
+    const described = describedSound(header);
+    if (!described) return;
+    const data = file && soundOf(file, header);
+    if (file && !data) {
+      this.#soundNotes = [DAMAGED_SOUND];
+      return;
+    }
+    let url = file ? null : String(addressOf(source));
+    const makeUrl = () => (this.#soundUrl ??= URL.createObjectURL(new Blob([data], { type: "audio/mp4" })));
+    this.sound = { ...described, get url() { return (url ??= makeUrl()); } };
+  }
+
   #takeAsset(asset) {
     this.indices = asset.indices ?? this.indices;
     /** Named meshes: `{name, vertices: [start, stop], triangles: [start, stop], material, parent}`; [] for one without a name. */
@@ -376,7 +403,7 @@ export class GeometryVideo {
     this.polygons = asset.polygons;
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
-    this.notes = asset.notes;
+    this.notes = [...asset.notes, ...this.#soundNotes];
   }
 
   /** The positions of frame k of level 0 by pictures of their own, so that what plays goes on. */
@@ -416,9 +443,9 @@ export class GeometryVideo {
 }
 
 /** Tracks beside the geometry's of a file that is here. */
-function companionsOf(file, { container: { companions } }) {
+function companionsOf(file, described) {
   const read = async (offset, length) => file.subarray(offset, offset + length);
-  return Array.isArray(companions) ? readCompanions(companions, file, placesInFile(file, companions.length), read) : [];
+  return described.length ? readCompanions(described, file, placesInFile(file, described.length), read) : [];
 }
 
 /** @throws {TypeError} it is nothing that can be loaded */

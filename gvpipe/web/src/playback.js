@@ -7,6 +7,7 @@
 import { LevelChooser } from "./level_chooser.js";
 import { closed } from "./format/request.js";
 import { checkRate } from "./playback_rate.js";
+import { SoundTrack } from "./sound_track.js";
 
 const ROUNDING = 1e-4; // of a frame: k / fps * fps may be a little less than k
 /** What `play` is rejected with. */
@@ -18,6 +19,14 @@ export function paused() {
 export function checkSeconds(value, name) {
   if (Number.isFinite(Number(value))) return Number(value);
   throw new TypeError(`${name} is ${value}; a number of seconds is needed`);
+}
+
+/** @throws {TypeError} it is no number @throws {DOMException} an IndexSizeError: it is not from 0 to 1 */
+export function checkVolume(volume) {
+  const wanted = Number(volume);
+  if (!Number.isFinite(wanted)) throw new TypeError(`the volume is ${volume}; a number from 0 to 1 is needed`);
+  if (wanted < 0 || wanted > 1) throw new DOMException(`the volume is ${wanted}; 0 to 1 is needed`, "IndexSizeError");
+  return wanted;
 }
 
 export class Playback {
@@ -37,6 +46,9 @@ export class Playback {
   #plays = false; // whether `playing` was told since it last did not
   #chooser = null; // LevelChooser, where levels are chosen here
   #isChanging = false; // to the level that it wants
+  #sound = null; // SoundTrack
+  #muted = false;
+  #volume = 1;
 
   /** The frame shown. */
   currentFrame;
@@ -47,7 +59,7 @@ export class Playback {
   /**
    * @param {import("./geometry_video.js").GeometryVideo} video
    * @param {{show: (positions: Float32Array, k: number) => void, prepare: (k: number) => Promise<void>, tell: (event: string) => void,
-   *   fail: (error: Error) => void}} on `prepare` loads what is shown beside positions of a frame that is sought; `tell` is given
+   *   fail: (error: Error) => void, silent?: () => void}} on `silent`: the browser cannot play the sound; `prepare` loads what is shown beside positions of a frame that is sought; `tell` is given
    *   names of `HTMLMediaElement`'s events
    * @param {(tick: (now: number) => void) => void} [nextTick] of `GeometryVideo.play`
    */
@@ -56,6 +68,34 @@ export class Playback {
     this.#on = on;
     this.#nextTick = nextTick;
     this.currentFrame = this.#aim = video.startFrame ?? 0;
+    if (!video.sound || typeof Audio !== "function") return;
+    const blocked = () => (this.muted = true);
+    this.#sound = new SoundTrack(video.sound, video.fps, video.frameCount, { blocked, failed: () => on.silent?.() });
+  }
+
+  /** Whether what plays is silent. */
+  get muted() {
+    return this.#muted;
+  }
+
+  set muted(muted) {
+    if (this.#muted === Boolean(muted)) return;
+    this.#muted = Boolean(muted);
+    if (this.#sound) this.#sound.muted = this.#muted;
+    this.#on.tell("volumechange");
+  }
+
+  /** 0 to 1. */
+  get volume() {
+    return this.#volume;
+  }
+
+  set volume(volume) {
+    const wanted = checkVolume(volume);
+    if (this.#volume === wanted) return;
+    this.#volume = wanted;
+    if (this.#sound) this.#sound.volume = wanted;
+    this.#on.tell("volumechange");
   }
 
   get duration() {
@@ -136,22 +176,32 @@ export class Playback {
     if (!this.paused) return this.#beginning;
     this.paused = false;
     this.#error = null;
+    const allowed = this.#sound?.prime(); // at once, as browsers ask
     this.#on.tell("play");
     if (this.aim === this.#video.frameCount - 1 && !this.#video.isLive) this.#request(0);
     this.#beginning = new Promise((resolve, reject) => {
       this.#giveUp = reject;
-      this.#begin().then(resolve, reject);
+      this.#begin(allowed).then(resolve, reject);
     });
     return this.#beginning;
   }
 
-  async #begin() {
+  async #begin(allowed) {
+    try {
+      await allowed;
+    } catch (error) {
+      this.#error = error;
+      this.pause();
+      throw error;
+    }
+    if (this.paused) throw this.#error ?? paused();
     await (this.#seeking ?? this.#start());
     if (this.paused && !this.ended) throw this.#error ?? paused();
   }
 
   pause() {
     this.#video.pause();
+    this.#sound?.stop();
     if (this.paused) return;
     this.paused = true;
     this.#plays = false;
@@ -170,6 +220,7 @@ export class Playback {
     this.paused = true;
     this.#giveUp(closed());
     this.#wanted = null;
+    this.#sound?.close();
   }
 
   #request(k) {
@@ -178,6 +229,7 @@ export class Playback {
     this.#aim = this.#wanted = Math.max(0, Math.min(this.#video.frameCount - 1, k || 0));
     this.#seeking ??= this.#seekWanted();
     this.#plays = false;
+    this.#sound?.stop();
     this.#on.tell("seeking");
     return this.#seeking;
   }
@@ -216,13 +268,18 @@ export class Playback {
       nextTick: this.#nextTick,
       ticked: (now, isThere) => this.#chooseLevel(now, isThere),
       waits: (isWaiting) => this.#tellWaiting(isWaiting),
+      clock: this.#sound ? (position) => this.#sound.clock(position) : undefined,
     };
     const starting = (this.#starting = {});
     try {
       await this.#video.play((positions, k) => this.#show(positions, k), on);
       if (this.#starting !== starting) return; // it was started again
-      if (this.paused) this.#video.pause(); // since
-      else this.#tellPlaying();
+      if (this.paused) {
+        this.#video.pause(); // since
+        return;
+      }
+      this.#sound?.start(this.currentFrame, this.#rate, this.#loops);
+      this.#tellPlaying();
     } catch (error) {
       if (error.name === "AbortError") return; // paused before the browser had begun
       if (error.name === "NotAllowedError") this.pause();
@@ -231,7 +288,11 @@ export class Playback {
   }
 
   #tellWaiting(isWaiting) {
-    if (!isWaiting) return this.#tellPlaying();
+    if (!isWaiting) {
+      this.#sound?.start(this.currentFrame, this.#rate, this.#loops);
+      return this.#tellPlaying();
+    }
+    this.#sound?.stop();
     this.#plays = false;
     return this.#on.tell("waiting");
   }
@@ -263,12 +324,14 @@ export class Playback {
 
   #show(positions, k) {
     this.currentFrame = k;
+    this.#sound?.follow(k);
     this.#on.show(positions, k);
     this.#on.tell("timeupdate");
   }
 
   #end() {
     this.paused = true;
+    this.#sound?.stop();
     this.#plays = false;
     this.ended = true;
     for (const event of ["timeupdate", "pause", "ended"]) this.#on.tell(event);

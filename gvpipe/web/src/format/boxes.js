@@ -12,7 +12,6 @@ import {
   STREAM_LAYOUT_ROOM_UUID as ROOM_UUID,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
-import { countTracks } from "./companions.js";
 import { AGAIN, GeometryVideoError } from "./errors.js";
 import { readUnfinished } from "./live_layout.js";
 import { readStream } from "./stream_layout.js";
@@ -28,8 +27,7 @@ const TAG = /gvpipe (\d{1,9}) ([0-9a-f]{32})/;
  * @property {number} bytes of the file
  * @property {string} id the content id of the tag, "" if the file has none
  * @property {Uint8Array[]} [clips] of a file that is not finished, by number @property {number} [frames] in them
- * @property {number} videoChecksum CRC-32 over the samples: gvpipe's files hold nothing else in their `mdat` boxes, of which companions
- *   have those behind the first
+ * @property {number} videoChecksum CRC-32 over the samples: gvpipe's files hold nothing else in their first `mdat` box
  *
  * @param {Uint8Array} file a whole MP4 file
  * @returns {Container}
@@ -57,11 +55,8 @@ export function readContainer(file) {
     throw new GeometryVideoError("not-geometry-video", "an MP4 file, but not one that gvpipe wrote");
   }
   if (payloads.length > 1) throw new GeometryVideoError("corrupt", `it holds two geometries; ${AGAIN}`);
-  let videoChecksum = 0;
-  const data = boxes.filter(({ kind }) => kind === "mdat");
-  for (const box of countTracks(file, moov) > 1 ? data.slice(0, 1) : data) {
-    videoChecksum = crc32(file.subarray(box.start, box.end), videoChecksum);
-  }
+  const { start, end } = boxes.find((box) => box.kind === "mdat"); // those behind it are companions'
+  const videoChecksum = crc32(file.subarray(start, end));
   const payload = file.subarray(payloads[0].start + 16, payloads[0].end);
   return { payload, bytes: file.length, id: tag ? tag[2] : "", videoChecksum };
 }

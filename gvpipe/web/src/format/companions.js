@@ -1,135 +1,150 @@
 /**
- * Companion tracks: what plays beside the geometry's video, such as a texture that moves. Mirrors `gvpipe.container.companion`;
- * `docs/format.md`, section 1. The player reads the geometry from a copy of the file's start that has the first track alone.
+ * Tracks beside the geometry's own, such as a sound: found in a whole file, and taken out of it as a file of one track.
+ * Mirrors `gvpipe.container.companion`; `docs/format.md`, section 1.5. A companion that is damaged is left out, with a note.
  */
 
-import { AGAIN, GeometryVideoError } from "./errors.js";
+import { listBoxes } from "../fragments.js";
+import { crc32 } from "./checksum.js";
+import { joined } from "./request.js";
 
-export const SECTION = /^companion\.(\d+)$/; // of an index
-const INSIDE = ["mdia", "minf", "stbl"]; // from a `trak` box down to its tables
+const HEAD = 8; // bytes of a box before its content
+const TO_TABLES = ["mdia", "minf", "stbl"];
+const NUMBER = 12; // bytes of a `tkhd` box's content before the track's number
+const [OF_TRACK, OF_FILM] = [20, 16]; // bytes of content before the duration in `tkhd` and `mvhd`
+const FTYP = new TextEncoder().encode("\0\0\0\x1cftypisom\0\0\x02\0isomiso2mp41");
+const CODECS = ["aac", "opus"];
+
+/** What a file's header says of companions: a list. */
+export function describedIn({ container }) {
+  return Array.isArray(container.companions) ? container.companions : [];
+}
 
 /**
- * @typedef {object} Companion a track, of which parts are fetched
- * @property {string} kind "sound" or "texture"
- * @property {object} about what the header says of it
- * @property {Uint8Array} trak its box
- * @property {Uint8Array} mvhd of its film
- * @property {number} start where its samples begin in the file @property {number} length bytes of them
- * @property {(offset: number, length: number) => Promise<Uint8Array>} read bytes of the file
+ * The boxes `ftyp` and `moov` with the geometry's track alone: others are empty space. The same array where there is no other.
+ *
+ * @param {Uint8Array} file that begins with them; it may be whole @returns {Uint8Array}
  */
+export function withoutCompanions(file) {
+  const found = tracksOf(file);
+  if (!found || found.tracks.length < 2) return file;
+  const { moov, tracks, view } = found;
+  const own = file.slice(0, moov.end);
+  const blank = ({ start, end }) => {
+    own.fill(0, start - HEAD + 4, end);
+    own.set([0x66, 0x72, 0x65, 0x65], start - HEAD + 4); // "free"
+  };
+  tracks.slice(1).forEach(blank);
+  const boxes = listBoxes(view, moov.start, moov.end);
+  const extended = boxes.find(({ kind }) => kind === "mvex");
+  if (extended) {
+    const defaults = listBoxes(view, extended.start, extended.end).filter(({ kind }) => kind === "trex");
+    defaults.slice(1).forEach(blank);
+  }
+  const result = new Uint8Array(file.length);
+  result.set(file);
+  result.set(own);
+  return result;
+}
 
-/** The boxes between two places: `{kind, start, content, end}`; ends where they do not fit. */
-export function boxesIn(data, start, end) {
-  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+/** A file as decoders of its pictures take it: without companions, and as long as its pictures are shown, for `<video>`. */
+export function geometryOf(file) {
+  const own = withoutCompanions(file);
+  if (own === file) return file;
+  const { moov, tracks, view } = tracksOf(own);
+  const mvhd = listBoxes(view, moov.start, moov.end).find(({ kind }) => kind === "mvhd");
+  const tkhd = listBoxes(view, tracks[0].start, tracks[0].end).find(({ kind }) => kind === "tkhd");
+  if (mvhd && tkhd) own.copyWithin(mvhd.start + OF_FILM, tkhd.start + OF_TRACK, tkhd.start + OF_TRACK + 4);
+  return own;
+}
+
+/**
+ * What is heard with a file, of what its header says.
+ *
+ * @returns {{codec: string, channels: number, rate: number, seconds: number, start: number}|null} null: nothing
+ */
+export function describedSound(header) {
+  const { kind, codec, channels, rate, seconds, start } = describedIn(header)[indexOfSound(header)] ?? {};
+  const areNumbers = [channels, rate, seconds].every((number) => number > 0) && start >= 0;
+  return kind === "sound" && CODECS.includes(codec) && areNumbers ? { codec, channels, rate, seconds, start } : null;
+}
+
+/**
+ * The sound of a whole file of the plain layout, as a file of one track.
+ *
+ * @param {Uint8Array} file @param {object} header @returns {Uint8Array|null} null: it is damaged, or gone
+ */
+export function soundOf(file, header) {
+  try {
+    return extracted(file, header, indexOfSound(header));
+  } catch (error) {
+    if (error instanceof RangeError || error instanceof TypeError) return null; // tables that end too early
+    throw error;
+  }
+}
+
+function indexOfSound(header) {
+  return describedIn(header).findIndex((each) => each?.kind === "sound");
+}
+
+function extracted(file, header, index) {
+  const described = describedIn(header);
+  const { moov, tracks, view } = tracksOf(file);
+  const media = listBoxes(view, 0, file.length).filter(({ kind }) => kind === "mdat");
+  if (tracks.length !== 1 + described.length || media.length < described.length) return null;
+  const [track, samples] = [tracks[1 + index], media[media.length - described.length + index]];
+  const trak = file.slice(track.start - HEAD, track.end);
+  move(trak, -samples.start, 1);
+  const data = file.subarray(samples.start, samples.end);
+  if (crc32(trak) !== described[index].trak_crc32 || crc32(data) !== described[index].crc32) return null;
+  const mvhd = listBoxes(view, moov.start, moov.end).find(({ kind }) => kind === "mvhd");
+  const film = file.slice(mvhd.start - HEAD, mvhd.end);
+  const tkhd = listBoxes(viewOf(trak), HEAD, trak.length).find(({ kind }) => kind === "tkhd");
+  film.set(trak.subarray(tkhd.start + OF_TRACK, tkhd.start + OF_TRACK + 4), HEAD + OF_FILM);
+  const sizes = [HEAD + film.length + trak.length, HEAD + data.length];
+  move(trak, FTYP.length + sizes[0] + HEAD, 1);
+  return joined([FTYP, head(sizes[0], "moov"), film, trak, head(sizes[1], "mdat"), data]);
+}
+
+/** Add a number of bytes to the places of a track's chunks, and give it a number. */
+function move(trak, bytes, number) {
+  const view = viewOf(trak);
+  let [start, end] = [HEAD, trak.length];
+  view.setUint32(listBoxes(view, start, end).find(({ kind }) => kind === "tkhd").start + NUMBER, number);
+  for (const wanted of TO_TABLES) ({ start, end } = listBoxes(view, start, end).find(({ kind }) => kind === wanted));
+  const table = listBoxes(view, start, end).find(({ kind }) => kind === "stco"); // files that pages hold have no 64-bit places
+  const count = view.getUint32(table.start + 4);
+  for (let at = table.start + 8; at < table.start + 8 + 4 * count; at += 4) view.setUint32(at, view.getUint32(at) + bytes);
+}
+
+/** The box `moov` and the tracks in it, null where there are none. */
+function tracksOf(file) {
+  const view = viewOf(file);
+  const moov = topBoxes(file, view).find(({ kind }) => kind === "moov");
+  if (!moov) return null;
+  return { view, moov, tracks: listBoxes(view, moov.start, moov.end).filter(({ kind }) => kind === "trak") };
+}
+
+/** Boxes up to `moov`: what follows may be cut off. */
+function topBoxes(file, view) {
   const boxes = [];
-  for (let at = start; at + 8 <= end; ) {
-    let [size, content] = [view.getUint32(at), at + 8];
-    if (size === 1 && at + 16 <= end) [size, content] = [view.getUint32(at + 8) * 2 ** 32 + view.getUint32(at + 12), at + 16];
-    else if (size === 0) size = end - at;
-    if (size < content - at || at + size > end) break;
-    boxes.push({ kind: String.fromCharCode(...data.subarray(at + 4, at + 8)), start: at, content, end: at + size });
+  for (let at = 0; at + HEAD <= file.length; ) {
+    const size = view.getUint32(at);
+    const kind = String.fromCharCode(...file.subarray(at + 4, at + HEAD));
+    if (size < HEAD || at + size > file.length) break;
+    boxes.push({ kind, start: at + HEAD, end: at + size });
+    if (kind === "moov") break;
     at += size;
   }
   return boxes;
 }
 
-/** The start of a file, or all of it, with its first track alone: the others become empty space. The same array where there is but one. */
-export function geometryAlone(file) {
-  const moov = boxesIn(file, 0, file.length).find(({ kind }) => kind === "moov");
-  if (!moov) return file;
-  const inner = boxesIn(file, moov.content, moov.end);
-  const others = inner.filter(({ kind }) => kind === "trak").slice(1);
-  if (!others.length) return file;
-  const mvex = inner.find(({ kind }) => kind === "mvex");
-  if (mvex) others.push(...boxesIn(file, mvex.content, mvex.end).filter(({ kind }) => kind === "trex").slice(1));
-  const alone = file.slice();
-  for (const { start, content, end } of others) {
-    alone.set([0x66, 0x72, 0x65, 0x65], start + 4); // "free"
-    alone.fill(0, content, end);
-  }
-  return alone;
+function viewOf(data) {
+  return new DataView(data.buffer, data.byteOffset, data.byteLength);
 }
 
-/** How many tracks a file has. */
-export function countTracks(file, moov) {
-  return boxesIn(file, moov.start, moov.end).filter(({ kind }) => kind === "trak").length;
-}
-
-/**
- * The companions that a file's header describes; those that are not there are left out.
- *
- * @param {object[]|undefined} described `container.companions` of the header
- * @param {Uint8Array} head the file's start, with its `moov` box
- * @param {(number: number) => {offset: number, length: number}|undefined} placeOf where the samples of a companion are
- * @param {(offset: number, length: number) => Promise<Uint8Array>} read
- * @returns {Companion[]}
- */
-export function readCompanions(described, head, placeOf, read) {
-  if (!Array.isArray(described)) return [];
-  const moov = boxesIn(head, 0, head.length).find(({ kind }) => kind === "moov");
-  const inner = moov ? boxesIn(head, moov.content, moov.end) : [];
-  const traks = inner.filter(({ kind }) => kind === "trak").slice(-described.length);
-  const mvhd = inner.find(({ kind }) => kind === "mvhd");
-  if (traks.length !== described.length || !mvhd) return [];
-  return described.flatMap((about, number) => {
-    const place = placeOf(number);
-    if (!place || about?.bytes !== place.length) return [];
-    const { start, end } = traks[number];
-    const trak = head.slice(start, end);
-    return [{ kind: about.kind, about, trak, mvhd: head.slice(mvhd.start, mvhd.end), start: place.offset, length: place.length, read }];
-  });
-}
-
-/** Where the samples of companions are in a whole file of the plain layout: in its last `mdat` boxes. */
-export function placesInFile(file, count) {
-  const data = boxesIn(file, 0, file.length).filter(({ kind }) => kind === "mdat").slice(-count);
-  return (number) => data[number] && { offset: data[number].content, length: data[number].end - data[number].content };
-}
-
-/** An MP4 file of a companion alone. @param {Companion} companion @returns {Promise<Uint8Array>} @throws {GeometryVideoError} */
-export async function fileOf({ trak, mvhd, start, length, read }) {
-  const ftyp = Uint8Array.of(0, 0, 0, 20, ...ascii("ftypisom"), 0, 0, 2, 0, ...ascii("isom"));
-  const moovSize = 8 + mvhd.length + trak.length;
-  const dataStart = ftyp.length + moovSize + 8;
-  const file = new Uint8Array(dataStart + length);
-  const view = new DataView(file.buffer);
-  file.set(ftyp);
-  box(view, ftyp.length, moovSize, "moov");
-  file.set(mvhd, ftyp.length + 8);
-  file.set(shifted(trak, dataStart - start), ftyp.length + 8 + mvhd.length);
-  box(view, dataStart - 8, 8 + length, "mdat");
-  file.set(await read(start, length), dataStart);
-  return file;
-}
-
-/** A `trak` box whose chunks lie so many bytes further back. */
-function shifted(trak, by) {
-  const result = trak.slice();
-  const view = new DataView(result.buffer);
-  let inside = boxesIn(trak, 8, trak.length);
-  for (const kind of INSIDE) {
-    const found = inside.find((each) => each.kind === kind);
-    if (!found) throw new GeometryVideoError("corrupt", `a track of its video has no ${kind} box; ${AGAIN}`);
-    inside = boxesIn(trak, found.content, found.end);
-  }
-  for (const { kind, content, end } of inside) {
-    const width = { stco: 4, co64: 8 }[kind];
-    if (!width) continue;
-    const count = view.getUint32(content + 4);
-    if (content + 8 + width * count > end) throw new GeometryVideoError("corrupt", `table ${kind} of a track of its video is cut short; ${AGAIN}`);
-    for (let at = content + 8; at < content + 8 + width * count; at += width) {
-      if (width === 4) view.setUint32(at, view.getUint32(at) + by);
-      else view.setBigUint64(at, view.getBigUint64(at) + BigInt(by));
-    }
-  }
-  return result;
-}
-
-function box(view, at, size, kind) {
-  view.setUint32(at, size);
-  ascii(kind).forEach((byte, i) => view.setUint8(at + 4 + i, byte));
-}
-
-function ascii(text) {
-  return [...text].map((letter) => letter.charCodeAt(0));
+function head(size, kind) {
+  const bytes = new Uint8Array(HEAD);
+  viewOf(bytes).setUint32(0, size);
+  bytes.set(new TextEncoder().encode(kind), 4);
+  return bytes;
 }

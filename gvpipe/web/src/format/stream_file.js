@@ -7,13 +7,13 @@ import { readFragmentSamples } from "../fragments.js";
 import { readDescription, ranks } from "../track.js";
 import { findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
-import { geometryAlone, readCompanions, SECTION as COMPANION } from "./companions.js";
+import { readCompanions } from "./companion_parts.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
 import { clipName, readHeader } from "./payload.js";
 import { joined, request } from "./request.js";
-import { checkHead, readIndex } from "./stream_layout.js";
+import { checkHead, OF_COMPANIONS, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
 const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas|clip)\.(\d+)$/;
@@ -74,6 +74,8 @@ export class StreamFile {
     this.received = received;
     this.incoming = incoming; // where the server knows no Range
     this.start = null; // bytes that came at first, until a segment is here
+    this.head = null; // the boxes `ftyp` and `moov`, without companions
+    this.wholeHead = null; // with them
     /** Sections that are here, by name. */
     this.sections = new Map();
     this.segments = new Map(); // number -> names of its sections
@@ -102,13 +104,13 @@ export class StreamFile {
 
   /** What a decoder of its pictures is set up with. @throws {GeometryVideoError} */
   get description() {
-    return readDescription(geometryAlone(this.head));
+    return readDescription(this.head);
   }
 
-  /** The companions that its header describes, of which parts are fetched. @returns {import("./companions.js").Companion[]} */
+  /** The companions that its header describes, of which parts are fetched. @returns {import("./companion_parts.js").Companion[]} */
   companions(described) {
     const read = (offset, length) => this.#fetch(offset, length);
-    return this.head ? readCompanions(described, this.head, (number) => this.places.get(`companion.${number}`), read) : [];
+    return this.wholeHead ? readCompanions(described, this.wholeHead, (number) => this.places.get(`companion.${number}`), read) : [];
   }
 
   /** What `readContainer` gives of a whole file. */
@@ -195,6 +197,7 @@ export class StreamFile {
     if (!names.some((name) => OF_SEGMENTS.test(name))) return false;
     if (names.some((name) => OF_PICTURES.test(name)) && typeof VideoDecoder !== "function") return false;
     this.head = checkHead(data, headSize, headChecksum);
+    this.wholeHead = data.slice(0, headSize);
     this.id = readTag(this.head)?.[2] ?? "";
     this.size = size;
     this.places = new Map(entries.map((entry) => [entry.name, entry]));
@@ -205,7 +208,7 @@ export class StreamFile {
       const number = OF_SEGMENTS.exec(name)?.[2];
       if (number) this.segments.set(number, [...(this.segments.get(number) ?? []), name]);
     }
-    const shared = entries.filter(({ name }) => !OF_SEGMENTS.test(name) && !OF_FIELDS.test(name) && !COMPANION.test(name));
+    const shared = entries.filter(({ name }) => ![OF_SEGMENTS, OF_FIELDS, OF_COMPANIONS].some((kind) => kind.test(name)));
     const start = Math.min(...shared.map(({ offset }) => offset));
     const end = Math.max(...shared.map(({ offset, length }) => offset + length));
     if (end > size) throw new GeometryVideoError("corrupt", `the index names places outside of the file; ${AGAIN}`);

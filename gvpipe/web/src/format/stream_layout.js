@@ -10,10 +10,11 @@ import {
   BITSTREAM_VERSION as VERSION,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
-import { geometryAlone, SECTION as COMPANION } from "./companions.js";
+import { withoutCompanions } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 
+export const OF_COMPANIONS = /^companion\./; // sections that are read apart
 const BOX_HEAD = 8; // bytes of the heads of `mdat` boxes
 
 /**
@@ -31,7 +32,7 @@ export function readStream(file, box) {
   checkHead(file, headSize, headChecksum);
   const sections = new Map();
   for (const { name, offset, length, checksum } of entries) {
-    if (COMPANION.test(name)) continue;
+    if (OF_COMPANIONS.test(name)) continue; // whose damage is theirs alone
     const data = take(file, offset, length);
     if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
     sections.set(name, data);
@@ -47,10 +48,10 @@ export function readStream(file, box) {
   return { sections, videoChecksum };
 }
 
-/** The boxes `ftyp` and `moov`, at the start of a file. */
+/** The boxes `ftyp` and `moov`, at the start of a file, without companions. */
 export function checkHead(file, size, checksum) {
-  const head = take(file, 0, size);
-  if (crc32(geometryAlone(head)) !== checksum) {
+  const head = withoutCompanions(take(file, 0, size));
+  if (crc32(head) !== checksum) {
     throw new GeometryVideoError("corrupt", `the description of its video is damaged; ${AGAIN}`);
   }
   return head;

@@ -2,7 +2,7 @@
 
 import { AssetEntry } from "../asset/asset_entry.js";
 import { MOVING } from "../asset/materials.js";
-import { fileOf } from "../format/companions.js";
+import { fileOf } from "../format/companion_parts.js";
 import { GeometryVideoError } from "../format/errors.js";
 import { readSamples } from "../track.js";
 import { DecodedTrack } from "./decoded_track.js";
@@ -21,7 +21,7 @@ export class MovingImages {
    * Those of the images that move, as far as this browser shows them.
    *
    * @param {object[]} images of the video @param {Iterable<number>} wanted which of them
-   * @param {import("../format/companions.js").Companion[]} companions
+   * @param {import("../format/companion_parts.js").Companion[]} companions
    * @param {{frames: number, fps: number}} header @param {import("../format/budget.js").Budget} budget
    * @returns {Promise<MovingImages>}
    */

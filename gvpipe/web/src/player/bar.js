@@ -16,6 +16,7 @@ const MARKUP = `
   <select aria-label="Speed" title="Speed (&lt; and &gt;)">
     ${SPEEDS.map((speed) => `<option value="${speed}">${speed}×</option>`).join("")}
   </select>
+  ${button("mute", "Mute (M)", "sound", "hidden")}
   ${button("loop", "Loop (L)", "loop", 'aria-pressed="false"')}
   ${button("wireframe", "Wireframe (W)", "wireframe", 'aria-pressed="false"')}
   ${button("follow", "Camera follows the mesh (C)", "follow", 'aria-pressed="false"')}
@@ -58,6 +59,7 @@ export class Bar {
     this.frames = video.frameCount;
     this.times = video.metadata.times; // of a simulation, whose steps are no frames of a film
     this.slider.max = video.frameCount - 1;
+    this.root.querySelector('[data-act="mute"]').hidden = !video.sound;
     const bits = (8 * video.byteLength) / (video.vertexCount * video.frameCount);
     this.facts.textContent = [
       ...(video.isLive ? ["live"] : []),
@@ -89,6 +91,12 @@ export class Bar {
     const play = this.root.querySelector('[data-act="play"]');
     play.innerHTML = icon(playing ? "pause" : "play");
     play.ariaLabel = play.title = playing ? "Pause (space)" : "Play (space)";
+  }
+
+  setMuted(muted) {
+    const mute = this.root.querySelector('[data-act="mute"]');
+    mute.innerHTML = icon(muted ? "muted" : "sound");
+    mute.ariaLabel = mute.title = muted ? "Sound on (M)" : "Mute (M)";
   }
 
   /** Leave a button out. @param {string} name */

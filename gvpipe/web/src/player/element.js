@@ -6,14 +6,15 @@
  * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours),
  * `scale` ("log": colours follow the logarithm), `warp` ("name:scale" of a field that moves vertices), `camera`
  * ("azimuth,elevation" of the first view, degrees), `shading` ("flat": each triangle has one normal),
- * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up).
+ * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up), `muted`, `volume` (0 to 1).
+ * Frames follow the sound's clock while it is heard. Browsers let a page play on its own only if it is `muted`.
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
  * the frame's number), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
 import { GeometryVideo, GeometryVideoError } from "../geometry_video.js";
-import { checkSeconds, paused } from "../playback.js";
+import { checkSeconds, checkVolume, paused } from "../playback.js";
 import { FASTEST, SLOWEST, checkRate } from "../playback_rate.js";
 import { COLORMAPS } from "../three/colormaps.js";
 import { isLogarithmic } from "../three/field_colours.js";
@@ -46,6 +47,7 @@ const ZOOM = 1.15;
 const LOST = "The browser took the picture's WebGL away, as it does when a page has many: remove some.";
 const READY = { nothing: 0, metadata: 1, enough: 4 }; // `readyState`, as in HTMLMediaElement
 const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupdate", "waiting", "ended", "ratechange"];
+const SOUND_ATTRIBUTES = ["muted", "volume"];
 
 const FIELD_ATTRIBUTES = ["field", "colormap", "range", "scale"];
 const VIEW_ATTRIBUTES = ["warp", "camera", "shading"];
@@ -55,7 +57,7 @@ const MOST_SHARE = 0.25; // of the diagonal, that the slider's end moves vertice
 const Base = globalThis.HTMLElement ?? class {};
 
 export class GeometryVideoElement extends Base {
-  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "lod", ...FIELD_ATTRIBUTES, ...VIEW_ATTRIBUTES];
+  static observedAttributes = ["src", "loop", "wireframe", "follow", "speed", "lod", ...SOUND_ATTRIBUTES, ...FIELD_ATTRIBUTES, ...VIEW_ATTRIBUTES];
 
   #stage = null;
   #bar;
@@ -142,6 +144,8 @@ export class GeometryVideoElement extends Base {
     if (FIELD_ATTRIBUTES.includes(name) && before !== value && this.#mesh) this.#showField();
     if (VIEW_ATTRIBUTES.includes(name) && before !== value && this.#mesh) this.#showView(name);
     if (name === "loop" && this.#mesh) this.#mesh.loop = this.loop;
+    if (name === "muted") this.#bar.setMuted(value !== null);
+    if (SOUND_ATTRIBUTES.includes(name) && before !== value) this.#setSound();
     if (name === "speed" && this.#mesh) this.#mesh.playbackRate = this.speed;
     else if (name === "speed" && before !== value) this.#tell("ratechange");
   }
@@ -189,12 +193,35 @@ export class GeometryVideoElement extends Base {
     this.setAttribute("speed", checkRate(rate));
   }
 
-  /** Always true: there is no sound. To set it changes nothing, so that scripts for `<video>` run. */
+  /** Whether what plays is silent; attribute `muted`. */
   get muted() {
-    return true;
+    return this.hasAttribute("muted");
   }
 
-  set muted(_) {}
+  set muted(muted) {
+    this.toggleAttribute("muted", Boolean(muted));
+  }
+
+  /** 0 to 1; attribute `volume`. */
+  get volume() {
+    const text = this.getAttribute("volume") ?? "";
+    const volume = text.trim() ? Number(text) : 1;
+    return volume >= 0 && volume <= 1 ? volume : 1;
+  }
+
+  set volume(volume) {
+    this.setAttribute("volume", checkVolume(volume));
+  }
+
+  /** Have the mesh as muted and as loud as the attributes say. */
+  #setSound() {
+    if (this.#mesh) {
+      this.#mesh.volume = this.volume;
+      this.#mesh.muted = this.muted;
+    } else {
+      this.#tell("volumechange");
+    }
+  }
 
   /** The frame shown. */
   get currentFrame() {
@@ -382,6 +409,12 @@ export class GeometryVideoElement extends Base {
     this.#showView("shading");
     mesh.loop = this.loop;
     mesh.playbackRate = this.speed;
+    this.#setSound();
+    mesh.addEventListener("volumechange", () => {
+      if (mesh.muted !== this.muted) this.muted = mesh.muted; // the browser refused to play it
+      this.#tell("volumechange");
+    });
+    mesh.addEventListener("notes", () => this.#bar.setNotes(mesh.notes));
     if (this.lod !== mesh.lod) mesh.lod = this.lod;
     for (const name of MEDIA_EVENTS) mesh.addEventListener(name, () => this.#tell(name));
     for (const name of ["play", "pause"]) {
@@ -573,6 +606,7 @@ export class GeometryVideoElement extends Base {
       last: () => this.seek(this.video.frameCount - 1),
       slower: () => this.setAttribute("speed", nextSpeed(this.speed, -1)),
       faster: () => this.setAttribute("speed", nextSpeed(this.speed, 1)),
+      mute: () => this.toggleAttribute("muted"),
       loop: () => this.toggleAttribute("loop"),
       wireframe: () => this.toggleAttribute("wireframe"),
       follow: () => this.toggleAttribute("follow"),

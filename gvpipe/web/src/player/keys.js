@@ -11,6 +11,7 @@ const KEYS = {
   "<": "slower",
   ">": "faster",
   l: "loop",
+  m: "mute",
   w: "wireframe",
   r: "view",
   c: "follow",

@@ -102,6 +102,10 @@ export class GeometryVideoMesh extends Mesh {
       prepare: (k) => (video.level ? undefined : Promise.all([this.#wanted.field?.load(k), this.#wantedWarp.field?.load(k)])),
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
+      silent: () => {
+        this.notes = [...this.notes, `this browser cannot play the sound (${video.sound.codec})`];
+        this.dispatchEvent({ type: "notes" });
+      },
     };
     const grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
     this.#unfollow = video.follow({ grown, lost: on.fail });
@@ -181,6 +185,24 @@ export class GeometryVideoMesh extends Mesh {
 
   set playbackRate(rate) {
     this.#playback.playbackRate = rate;
+  }
+
+  /** Whether what plays is silent; while it is heard, frames follow the sound's clock. */
+  get muted() {
+    return this.#playback.muted;
+  }
+
+  set muted(muted) {
+    this.#playback.muted = muted;
+  }
+
+  /** Of the sound, 0 to 1. */
+  get volume() {
+    return this.#playback.volume;
+  }
+
+  set volume(volume) {
+    this.#playback.volume = volume;
   }
 
   /** "auto": a coarser level of detail where the page cannot keep up while it plays, a finer one again once it can; else the level. */
