@@ -25,6 +25,7 @@ TESTS = ROOT / "tests"
 FOLDER = ROOT / "build" / "fuzz" / "seeds"
 LARGEST = 60_000  # bytes of a seed: larger ones take too long a case
 N_FRAMES = 6  # of samples
+SOUND_SECONDS = 0.3
 N_VERTICES = 120  # of the flag, whose first ones are taken
 FAST = {"preset": "ultrafast", "gop": 4, "clusters": 3}
 PROFILES: dict[str, tuple[str, dict[str, Any]]] = {
@@ -89,6 +90,8 @@ def make_seeds(folder: Path) -> None:
     for sample, sequence in _samples().items():
         for name, (codec, settings) in PROFILES.items():
             gvpipe.encode(sequence, folder / "videos" / f"{sample}-{name}.mp4", codec, **settings)
+    voice = gvpipe.read_sound(ROOT / "samples" / "voice.wav").part(0, SOUND_SECONDS)
+    gvpipe.encode(_samples()["flag"], folder / "videos" / "flag-sound.mp4", "pdct", audio=voice)
     for sample, sequence in _scenes().items():
         for name in ("mcgv", "pca", "mcgv-affine"):
             codec, settings = PROFILES[name]

@@ -54,9 +54,10 @@ def load_targets(options: Options) -> list[Target]:
     if options.loader is not None:
         return options.loader(options)
     from fuzz.browser import browser_targets
+    from fuzz.companions import companion_seeds, companion_target
     from fuzz.live import live_target
     from fuzz.mesh_files import mesh_targets
-    from fuzz.seeds import TESTS, load_live, load_seeds
+    from fuzz.seeds import ROOT, TESTS, load_live, load_seeds
     from fuzz.shards import shard_seeds, shard_target
     from fuzz.strange import strange_targets
     from fuzz.streams import stream_target
@@ -70,7 +71,13 @@ def load_targets(options: Options) -> list[Target]:
     growing = load_live(Path(options.seeds))
     shards = shard_seeds([TESTS / "golden" / f"{name}.mp4" for name in ("pca-1-kalman", "pca-1-still", "pdct-1")])
     kinds = {
-        "video": [*video_targets(videos), stream_target(streams), live_target(growing), shard_target(shards)],
+        "video": [
+            *video_targets(videos),
+            stream_target(streams),
+            live_target(growing),
+            shard_target(shards),
+            companion_target(companion_seeds(TESTS / "golden" / "pdct-1.mp4", ROOT / "samples" / "voice.wav")),
+        ],
         "mesh": mesh_targets(meshes),
         "web": browser_targets(videos, streams, growing),
         "strange": strange_targets((TESTS / "golden" / "pdct-1.mp4").read_bytes()),

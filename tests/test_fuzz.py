@@ -11,12 +11,13 @@ from pathlib import Path
 import fuzz_targets
 import numpy as np
 import pytest
-from folders import GOLDEN
+from folders import GOLDEN, SAMPLES
 
 import gvpipe
 from fuzz import limits
 from fuzz.boxes import parse_boxes
 from fuzz.browser import Node, RefusedByPlayer
+from fuzz.companions import companion_seeds, companion_target
 from fuzz.hdf import mutate_hdf
 from fuzz.limits import ACCEPTED, REFUSED, judge
 from fuzz.live import live_target, split_live
@@ -79,6 +80,16 @@ def test_a_shard_put_together_is_read(number: int, tmp_path: Path) -> None:
     )
     verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 30)]
     assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
+
+
+def test_a_sound_put_together_is_read(tmp_path: Path) -> None:
+    seeds = companion_seeds(GOLDEN / "pdct-1.mp4", SAMPLES / "voice.wav")
+    target = companion_target(seeds)
+    again = write_files(target.join(seeds[0].parts), tmp_path / "case")
+    sound = gvpipe.open(again).sound
+    assert sound is not None and sound.codec == "aac" and abs(sound.seconds - 0.3) < 0.15
+    verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(2, 12)]
+    assert {verdict.kind for verdict in verdicts} == {ACCEPTED}, verdicts  # the geometry is whole
 
 
 def test_cases_repeat_and_checksums_hold(tmp_path: Path) -> None:

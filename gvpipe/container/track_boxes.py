@@ -169,7 +169,7 @@ def _tkhd(trak: bytes) -> Span:
 
 
 def _duration(trak: bytes) -> int:
-    """Of a track, in the units of the film."""
+    """How long a track lasts, in the units of the film."""
     at, form = _place(trak, _tkhd(trak).content, DURATION_IN_TKHD)
     (duration,) = struct.unpack_from(form, trak, at)
     return int(duration)

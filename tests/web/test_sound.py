@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import wave
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,9 @@ def driver(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     if missing := browsers.missing(request.param):
         pytest.skip(missing)
     profile = tmp_path_factory.mktemp("profile")
-    server = browsers.sound_server(tmp_path_factory.mktemp("sound")) if request.param == "firefox" else nullcontext({})
+    server: AbstractContextManager[dict[str, str]] = nullcontext({})
+    if request.param == "firefox":
+        server = browsers.sound_server(tmp_path_factory.mktemp("sound"))
     with server as more, browsers.browser(request.param, profile, more=more) as running:
         running.name_of_test = request.param
         yield running

@@ -38,8 +38,10 @@ export class GeometryVideoElement extends HTMLElement {
   readonly currentSrc: string;
   autoplay: boolean;
   loop: boolean;
-  /** Always true: there is no sound. */
+  /** Whether what plays is silent. */
   muted: boolean;
+  /** 0 to 1. */
+  volume: number;
   /** 0.0625 to 16; attribute `speed`. */
   playbackRate: number;
   readonly speed: number;

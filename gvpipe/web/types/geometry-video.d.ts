@@ -35,6 +35,8 @@ export interface PlayOptions {
   ticked?: (now: number, isThere: boolean) => void;
   /** Called when it waits for frames that are on their way or not yet written, and when it goes on. */
   waits?: (isWaiting: boolean) => void;
+  /** Gives another position, in frames since the start, in place of what the time makes of it; null: none. */
+  clock?: (position: number) => number | null;
 }
 
 /** A named mesh of the video: ranges `[start, stop]` of its vertices and triangles. */
@@ -195,6 +197,15 @@ export class GeometryVideo {
   readonly buffered: [number, number][];
   /** Bits per second. */
   readonly bitRate: number;
+  /** What is heard with it; `start` in seconds after frame 0, `url` of a file, or a track of one, that browsers play. */
+  readonly sound: {
+    readonly codec: "aac" | "opus";
+    readonly channels: number;
+    readonly rate: number;
+    readonly seconds: number;
+    readonly start: number;
+    readonly url: string;
+  } | null;
   /** (T, 3): vertices of triangles, counter-clockwise. */
   readonly indices: Uint32Array;
   /** (V, 3): frame 0 on the file's lattice; vertices with equal rows are one point of the surface. */

@@ -35,6 +35,9 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   durationchange: {};
   ended: {};
   ratechange: {};
+  volumechange: {};
+  /** `notes` has changed. */
+  notes: {};
   /** A frame is shown. */
   frame: { frame: number };
   /** Another level of detail is shown; geometry and materials are new. */
@@ -80,6 +83,10 @@ export class GeometryVideoMesh extends MeshOfVideo {
   loop: boolean;
   /** 0.0625 to 16; 1 is the video's own. */
   playbackRate: number;
+  /** Whether what plays is silent; while it is heard, frames follow the sound's clock. */
+  muted: boolean;
+  /** Of the sound, 0 to 1. */
+  volume: number;
   readonly partNames: string[];
   /** Hides the parts of these names, and shows all others. */
   hide(names: string | Iterable<string>): void;
