@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
-from gvpipe.asset_coding.moving_textures import MovingCoding
+from gvpipe.asset_coding.moving_textures import MovingCoding, alpha_notes
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
 from gvpipe.asset_coding.sound_track import pack_sound
@@ -717,7 +717,8 @@ def _notes(sequence: MeshSequence, target: Target | None, plan: Plan) -> list[st
     diagonal = frame_diagonal(sequence)
     loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
     rounded = notes.rounded(sequence.rounding, diagonal)
-    return [*sequence.notes, *loose, *rounded, *notes.whole_numbers(plan.whole), *notes.not_carried(sorted(plan.left_out))]
+    said = [*loose, *rounded, *notes.whole_numbers(plan.whole), *notes.not_carried(sorted(plan.left_out))]
+    return [*sequence.notes, *said, *alpha_notes(plan.images)]
 
 
 def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:

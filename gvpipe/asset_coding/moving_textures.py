@@ -6,7 +6,9 @@ names its number. How a row of pictures becomes a track is `gvpipe.media.picture
 
 from __future__ import annotations
 
+import io
 import itertools
+import warnings
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +42,7 @@ class CodedPictures(Protocol):
 
     @property
     def codec(self) -> str:
-        """Of the track: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
+        """The track's codec: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
         ...
 
     def track(self, fps: float) -> bytes:
@@ -114,6 +116,29 @@ def code_moving(images: Sequence[Image], sequence: MeshSequence, coding: MovingC
     return tuple(companions)
 
 
+def alpha_notes(images: Sequence[Image]) -> tuple[str, ...]:
+    """A note for each moving image whose first picture is see-through somewhere: video has no alpha."""
+    notes = []
+    for image in images:
+        if image.pictures is None or isinstance(image.pictures, CodedPictures) or not _has_alpha(image.pictures.file(0)[1]):
+            continue
+        notes.append(f"texture {image.name!r} moves, and loses its alpha: its pictures become a video, which has none")
+    return tuple(notes)
+
+
+def _has_alpha(data: bytes) -> bool:
+    """Whether a picture is see-through somewhere; False for one that Pillow cannot open."""
+    from PIL import Image as Pillow
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large pictures, whose side is checked elsewhere
+            with Pillow.open(io.BytesIO(data)) as opened:
+                return opened.has_transparency_data and bool(np.asarray(opened.convert("RGBA"))[:, :, 3].min() < 255)
+    except Exception:  # damaged files raise nearly anything inside Pillow
+        return False
+
+
 def _pixels(pictures: Pictures) -> Iterator[UInt8]:
     return (pictures.pixels(frame) for frame in range(len(pictures)))
 
@@ -127,7 +152,7 @@ class TrackPictures(PictureReader):
 
     @property
     def codec(self) -> str:
-        """Of the track: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
+        """The track's codec: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
         return str(self._companion.about.get("codec", ""))
 
     @property

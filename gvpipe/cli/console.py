@@ -121,7 +121,7 @@ def texture_options(command: Command) -> Command:
     """Give a command ``--texture`` and ``--texture-video``."""
     video = click.option("--texture-video", metavar="FILE", help="The same from a video.")
     pictures = click.option(
-        "--texture", metavar="FOLDER|PATTERN", help="A picture for each frame: the base colour of all materials."
+        "--texture", metavar="FOLDER|PATTERN", help="A picture for each frame, in place of the colours' texture."
     )
     return pictures(video(command))
 

@@ -59,16 +59,6 @@ class FilePictures:
         """As of `Pictures`; alpha is left out."""
         return _pixels(self.file(frame)[1], self._paths[frame], self._size)
 
-    @property
-    def has_alpha(self) -> bool:
-        """Whether the first picture is see-through somewhere."""
-        from PIL import Image
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            with Image.open(self._paths[0]) as opened:
-                return opened.has_transparency_data and bool(np.asarray(opened.convert("RGBA"))[:, :, 3].min() < 255)
-
 
 class BytesPictures:
     """Pictures whose files are in memory (`Pictures`).

@@ -35,7 +35,7 @@ class VideoPictures(PictureReader):
 
     @property
     def codec(self) -> str:
-        """Of the track: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
+        """The track's codec: ``"h264"``, ``"hevc"``, ``"av1"`` or ``"vp9"``."""
         return self._codec
 
     def track(self, fps: float) -> bytes:

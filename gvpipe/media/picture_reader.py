@@ -7,6 +7,7 @@ kept as far as `KEPT` allows, so that a film that plays backwards does not decod
 from __future__ import annotations
 
 import io
+import itertools
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -19,11 +20,10 @@ from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import CorruptFile, FormatError, InputError, corrupt
 from gvpipe.foundation.picture_limits import BYTES_PER_PIXEL, picture_limits
 from gvpipe.media.picture_video import ACCURATE, BILINEAR, codec_name, first_video, video_error
+from gvpipe.media.video import SECONDS_PER_PIXEL, SPARE_PIXELS
 from gvpipe.runtime.forks import ForkLock
 
 KEPT = 48 << 20  # bytes of decoded samples
-SPARE_PIXELS = 1 << 16  # for margins that FFmpeg adds
-DEPTH = 16  # pictures that a decoder holds
 SPACES = {5: "ITU601", 6: "ITU601", 7: "SMPTE240M"}  # matrices by their number; all others are read as BT.709
 FULL = 2  # FFmpeg's number of full range
 
@@ -187,10 +187,11 @@ class PictureReader:
         """The track taken apart; raises `CorruptFile`, `OverBudget`."""
         if self._coded is None:
             width, height = self._size
-            self._budget.ask(
-                f"moving texture {self._name!r} of {width}x{height}", DEPTH * BYTES_PER_PIXEL // 8 * width * height
-            )
+            what = f"moving texture {self._name!r} of {width}x{height}"
+            self._budget.ask(what, BYTES_PER_PIXEL * width * height)
             coded = self._load()
+            longest = max(stop - start for start, stop in itertools.pairwise(coded.starts))
+            self._budget.ask(what, BYTES_PER_PIXEL * width * height, SECONDS_PER_PIXEL * longest * width * height)
             if len(coded.packets) != self._count:
                 raise corrupt(f"moving texture {self._name!r} has {len(coded.packets)} pictures in place of {self._count}")
             self._coded = coded

@@ -28,49 +28,65 @@ class TexelFill:
     def __init__(self, used: Bool) -> None:
         import cv2
 
-        self._used, self._is_needed = used, bool(used.any() and not used.all())
+        self._is_needed = bool(used.any() and not used.all())
         if not self._is_needed:
             return
-        self._weights: list[Float32] = [used.astype(np.float32)]
+        self._used = used.astype(np.uint8)
+        self._weights: list[Float32] = [_halved(used.astype(np.float32))]
         while max(self._weights[-1].shape) > 1 and self._weights[-1].min() == 0:
             self._weights.append(_halved(self._weights[-1]))
-        self._inverse = [1 / np.maximum(weights, 1e-6) for weights in self._weights]
-        away = cv2.distanceTransform((~used).astype(np.uint8), cv2.DIST_L2, 3)
-        self._moves = np.clip((FAR - away) / (FAR - NEAR), 0, 1).astype(np.float32)[:, :, None]
-        self._still: Float32 | None = None
+        self._inverse = [(1 / np.maximum(weights, 1e-6))[:, :, None] for weights in self._weights]
+        away = cv2.distanceTransform(1 - self._used, cv2.DIST_L2, 3)
+        moves = np.clip((FAR - away) / (FAR - NEAR), 0, 1).astype(np.float32)
+        self._band = np.flatnonzero((self._used == 0) & (moves > 0))  # texels that move, but are not used
+        self._moves = moves.reshape(-1, 1)[self._band]
+        self._still: UInt8 | None = None
 
     def __call__(self, pixels: UInt8) -> UInt8:
         """A picture ``(H, W, 3) uint8`` with other texels in place of those that are not used."""
         if not self._is_needed:
             return pixels
+        import cv2
+
         spread = self._spread(pixels)
         if self._still is None:
             self._still = spread
-        spread = self._still + self._moves * (spread - self._still)
-        result = (spread + np.float32(0.5)).astype(np.uint8)
-        np.copyto(result, pixels, where=self._used[:, :, None])
+        still, moving = (each.reshape(-1, 3)[self._band].astype(np.float32) for each in (self._still, spread))
+        result = self._still.copy()
+        result.reshape(-1, 3)[self._band] = still + self._moves * (moving - still) + np.float32(0.5)
+        cv2.copyTo(np.ascontiguousarray(pixels), self._used, result)
         return result
 
-    def _spread(self, pixels: UInt8) -> Float32:
-        """The fill of all texels, ``(H, W, 3)``, 0..255."""
+    def _spread(self, pixels: UInt8) -> UInt8:
+        """The fill of all texels, ``(H, W, 3)``."""
         import cv2
 
-        sums = [np.multiply(pixels, self._weights[0][:, :, None], dtype=np.float32)]
+        seen = cv2.bitwise_and(np.ascontiguousarray(pixels), np.ascontiguousarray(pixels), mask=self._used)
+        sums = [_halved(np.asarray(seen, np.float32))]
         for _ in self._weights[1:]:
             sums.append(_halved(sums[-1]))
-        colours = np.asarray(sums.pop() * self._inverse[-1][:, :, None], np.float32)
+        colours = np.asarray(sums.pop() * self._inverse[-1], np.float32)
         for level in range(len(sums) - 1, -1, -1):
             height, width = self._weights[level].shape
             larger = cv2.resize(colours, (width, height), interpolation=cv2.INTER_LINEAR)
             colours = np.asarray(larger, np.float32).reshape(height, width, 3)
             is_own = self._weights[level][:, :, None] > 0
-            np.copyto(colours, sums[level] * self._inverse[level][:, :, None], where=is_own)
-        return np.clip(colours, 0, 255)
+            np.copyto(colours, sums[level] * self._inverse[level], where=is_own)
+        levels = np.clip(colours + np.float32(0.5), 0, 255).astype(np.uint8)
+        height, width = self._used.shape
+        return np.asarray(cv2.resize(levels, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8).reshape(
+            height, width, 3
+        )
 
 
 def _halved(level: Float32) -> Float32:
     """The mean of each two by two texels; what an odd side lacks counts as empty."""
+    import cv2
+
     height, width = level.shape[:2]
-    padded = np.pad(level, ((0, height % 2), (0, width % 2), *(((0, 0),) * (level.ndim - 2))))
-    rows: Float32 = padded[0::2] + padded[1::2]
-    return (rows[:, 0::2] + rows[:, 1::2]) * np.float32(0.25)
+    padded = (
+        np.pad(level, ((0, height % 2), (0, width % 2), *(((0, 0),) * (level.ndim - 2)))) if height % 2 or width % 2 else level
+    )
+    size = (padded.shape[1] // 2, padded.shape[0] // 2)
+    half = np.asarray(cv2.resize(padded, size, interpolation=cv2.INTER_AREA), np.float32)
+    return half.reshape(size[1], size[0], *level.shape[2:])

@@ -13,7 +13,10 @@ from gvpipe.model.sequence import MeshSequence
 
 
 def with_pictures(sequence: MeshSequence, pictures: Any, name: str = "texture") -> MeshSequence:
-    """Return the sequence with a picture per frame as the base colour of all its materials, of one that is made if it has none.
+    """Return the sequence with a picture per frame as the base colour of its materials.
+
+    Materials whose base colour is a texture show it in place of that; where there are none, all show it. A part without a
+    material gets one, if there is no such texture.
 
     Args:
         sequence: with texture coordinates ``uv``.
@@ -30,16 +33,20 @@ def with_pictures(sequence: MeshSequence, pictures: Any, name: str = "texture") 
         )
     image = Image(name, pictures=pictures)
     number = len(sequence.images)
-    given = sequence.materials or (Material(name=name, double_sided=True),)
-    parts = sequence.parts or (Part("", (0, sequence.n_vertices), (0, len(sequence.faces))),)
-    if any(part.material is None for part in parts):
-        given = given if not sequence.materials else (*given, Material(name=name, double_sided=True))
-        parts = tuple(replace(part, material=len(given) - 1) if part.material is None else part for part in parts)
-    materials, images = without_unused([_shows(material, number) for material in given], [*sequence.images, image])
+    given, parts = sequence.materials, sequence.parts or (Part("", (0, sequence.n_vertices), (0, len(sequence.faces))),)
+    if any(material.base_color_texture for material in given):
+        shown = [_replaced(material, number) for material in given]
+    else:
+        if any(part.material is None for part in parts):
+            given = (*given, Material(name=name, double_sided=True))
+            parts = tuple(replace(part, material=len(given) - 1) if part.material is None else part for part in parts)
+        white = (1.0, 1.0, 1.0)
+        shown = [replace(each, base_color_texture=Texture(number), base_color=(*white, each.base_color[3])) for each in given]
+    materials, images = without_unused(shown, [*sequence.images, image])
     return sequence.with_looks(materials, images, parts)
 
 
-def _shows(material: Material, number: int) -> Material:
+def _replaced(material: Material, number: int) -> Material:
+    """A material whose base colour shows another image, if it shows any."""
     before = material.base_color_texture
-    texture = Texture(number) if before is None else replace(before, image=number)
-    return replace(material, base_color_texture=texture, base_color=(1.0, 1.0, 1.0, material.base_color[3]))
+    return material if before is None else replace(material, base_color_texture=replace(before, image=number))

@@ -50,8 +50,8 @@ def read(
             become a film of 25 frames a second. The times are kept either way.
         warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
         volume: whether what lies inside of a simulation's surface is read, too: volume cells, inner points, and their numbers.
-        texture: a picture for each frame, as the base colour of all materials: a folder, a glob or a pattern of pictures, or
-            a video.
+        texture: a picture for each frame, in place of the texture of the base colour: a folder, a glob or a pattern of
+            pictures, or a video.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -83,7 +83,8 @@ def add_texture(sequence: MeshSequence, texture: StrPath, frames: tuple[int, int
     from gvpipe.model.moving_texture import with_pictures
 
     pictures = open_pictures(check_path(texture, "the texture"), len(sequence), frames)
-    return with_pictures(sequence, pictures, Path(os.fspath(texture)).stem.rstrip("_-. %0d#*") or "texture")
+    name = Path(os.fspath(texture)).stem.rstrip("_-. %0d#*") or "texture"
+    return with_pictures(sequence, pictures, name)
 
 
 def _read(

@@ -122,7 +122,9 @@ def test_16_bits_and_alpha_become_rgb(tmp_path: Path) -> None:
     assert FilePictures([tmp_path / "a.png"]).pixels(0).tolist() == [[[200] * 3] * 4] * 4
     Image.new("RGBA", (4, 4), (9, 8, 7, 0)).save(tmp_path / "b.png")
     row = FilePictures([tmp_path / "b.png"])
-    assert row.has_alpha and row.pixels(0)[0, 0].tolist() == [9, 8, 7]
+    assert row.pixels(0)[0, 0].tolist() == [9, 8, 7]
+    report = gvpipe.encode(with_pictures(sheet(1), row, "skin"), tmp_path / "a.mp4", "pca")
+    assert any("'skin' moves, and loses its alpha" in note for note in report.notes)
 
 
 def test_a_video_of_another_program_is_taken_as_it_is(tmp_path: Path) -> None:

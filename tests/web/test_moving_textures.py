@@ -63,7 +63,8 @@ window.begin = async (name) => {
   };
   return { mesh, draw, seek, play, jump, end };
 };</script>"""
-START = """const film = await window.begin(args[0]);
+START = """while (!window.begin) await new Promise((resolve) => setTimeout(resolve, 20));
+    const film = await window.begin(args[0]);
     const rest = (ms) => new Promise((resolve) => setTimeout(resolve, ms));"""
 Run = Callable[..., Any]
 

@@ -52,7 +52,7 @@ class Textures:
     def read(self, assets: Sequence[Any], output: str, texture: Texture, scale: tuple[float, ...]) -> Source | None:
         """Return the texture with its image, or None for a file that is missing, outside of the folder or no picture.
 
-        Of several assets, one for each frame, the image moves; a frame whose file cannot be read shows that of the frame before.
+        Of several assets, one for each frame, the image moves; where a file cannot be read, that of the frame before is shown.
         """
         if assets[0] is None or not assets[0].path:
             return None
