@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.foundation.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report, Restreamed, compare, decode, encode, open, render, restream, skin
+    from gvpipe.api import Report, Restreamed, compare, decode, encode, open, open_capture, render, restream, skin
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -31,20 +31,26 @@ if TYPE_CHECKING:
     from gvpipe.media.sound import Sound
     from gvpipe.media.sound_files import read_sound
     from gvpipe.metrics.comparison import Comparison
+    from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
-    from gvpipe.playback.files import read, write
+    from gvpipe.notebook import show
+    from gvpipe.playback.capture_player import CapturePlayer
+    from gvpipe.playback.files import read, read_capture, write
     from gvpipe.playback.live import LiveEncoder, open_live
     from gvpipe.playback.player import Player
     from gvpipe.playback.video_info import Info, info
     from gvpipe.rasterizer.camera import Camera
     from gvpipe.rasterizer.renderer import Renderer
+    from gvpipe.recording import Recorder, RigidParts, record
     from gvpipe.web import ExportReport, export_html
 
 __all__ = [
     "Attribute",
     "BatchReport",
     "Camera",
+    "Capture",
+    "CapturePlayer",
     "Cells",
     "Comparison",
     "ExportReport",
@@ -58,9 +64,11 @@ __all__ = [
     "Metadata",
     "Part",
     "Player",
+    "Recorder",
     "Renderer",
     "Report",
     "Restreamed",
+    "RigidParts",
     "Skin",
     "Sound",
     "Texture",
@@ -74,17 +82,21 @@ __all__ = [
     "from_vtk",
     "info",
     "open",
+    "open_capture",
     "open_live",
     "read",
+    "read_capture",
     "read_sound",
+    "record",
     "render",
     "restream",
+    "show",
     "skin",
     "write",
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Report", "Restreamed", "compare", "decode", "encode", "open", "render", "restream", "skin"),
+    "gvpipe.api": ("Report", "Restreamed", "compare", "decode", "encode", "open", "open_capture", "render", "restream", "skin"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),
@@ -95,7 +107,9 @@ _HOMES = {
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
-    "gvpipe.playback.files": ("read", "write"),
+    "gvpipe.notebook": ("show",),
+    "gvpipe.playback.capture_player": ("CapturePlayer",),
+    "gvpipe.playback.files": ("read", "read_capture", "write"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
     "gvpipe.media.sound": ("Sound",),
     "gvpipe.media.sound_files": ("read_sound",),
@@ -103,8 +117,10 @@ _HOMES = {
     "gvpipe.playback.player": ("Player",),
     "gvpipe.rasterizer.camera": ("Camera",),
     "gvpipe.rasterizer.renderer": ("Renderer",),
+    "gvpipe.model.capture": ("Capture",),
     "gvpipe.model.sequence": ("MeshSequence",),
     "gvpipe.model.skin": ("Skin",),
+    "gvpipe.recording": ("Recorder", "RigidParts", "record"),
     "gvpipe.playback.video_info": ("Info", "info"),
     "gvpipe.web": ("ExportReport", "export_html"),
 }

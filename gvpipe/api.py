@@ -17,26 +17,30 @@ from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
 from gvpipe.asset_coding.moving_textures import MovingCoding, alpha_notes
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
-from gvpipe.asset_coding.sound_track import pack_sound
+from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
 from gvpipe.asset_coding.sound_track import read_sound as read_sound_track
+from gvpipe.captures.encoding import CodedShot, write_capture
 from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
 from gvpipe.coding.segment_memory import fit_segments
-from gvpipe.container.bitstream import BARE, LIVE, PLAIN, STREAM, Bitstream
-from gvpipe.container.mp4 import bytes_by_part, load, read_file, write_file
+from gvpipe.container.bitstream import BARE, LIVE, PLAIN, SHOTS, STREAM, Bitstream
+from gvpipe.container.mp4 import bytes_by_part, file_bytes, load, read_bytes, read_file, write_file
+from gvpipe.container.shots import copy_shots
 from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
 from gvpipe.foundation import notes
 from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
-from gvpipe.foundation.errors import InputError, OverBudget, SettingError, in_file
+from gvpipe.foundation.errors import InputError, OverBudget, SettingError, SeveralShots, TopologyChange, in_file
 from gvpipe.foundation.progress import Progress
 from gvpipe.media.sound import Sound
 from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.model.warp import warped
-from gvpipe.playback.files import Source, add_texture, frame_range, read
+from gvpipe.playback.capture_player import CapturePlayer
+from gvpipe.playback.files import Source, add_texture, add_texture_to_shots, frame_range, read, read_capture
 from gvpipe.playback.player import Player
 from gvpipe.playback.sounds import AudioOptions, sound_beside, with_sound
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -61,6 +65,7 @@ if TYPE_CHECKING:
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 LAYOUTS = ("stream", "bare")
+CAPTURE_CODEC = "pca"  # of shots, which are short: `mcgv` looks for motion that they do not have
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,8 @@ class Report:
         notes: what a user should know, a line each.
         errors: ``rmse``, ``rmse_diag``, ``max``, ``max_diag`` and ``kg`` of the file, as in `Comparison`, where a target was
             given or codecs competed; else empty.
+        shots: of a capture: ``start``, ``frames``, ``vertices``, ``triangles``, ``codec`` and ``bytes`` of each. Then
+            ``vertices`` and ``triangles`` are those of the largest, ``codec`` and ``settings`` those of the first.
         audio: as in `Info`.
     """
 
@@ -95,6 +102,7 @@ class Report:
     reason: str
     notes: list[str]
     errors: dict[str, float | None] = field(default_factory=dict)
+    shots: list[dict[str, Any]] = field(default_factory=list)
     audio: dict[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
@@ -107,7 +115,7 @@ class Restreamed:
     """What `restream` did.
 
     Args:
-        layout: of the file that it wrote: ``plain`` or ``stream``.
+        layout: of the file that it wrote: ``plain``, ``stream``, or ``shots`` of a capture.
         bytes_before, bytes: of the source and of the file.
         notes: what a user should know, a line each.
     """
@@ -142,7 +150,7 @@ class _StageClock:
 
 
 def encode(
-    source: MeshSequence | Source,
+    source: MeshSequence | Capture | Source,
     path: StrPath,
     codec: str | Codec | Sequence[Codec] | None = None,
     progress: Progress | None = None,
@@ -167,7 +175,7 @@ def encode(
     scheduler: str | None = None,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = None,
     texture: StrPath | None = None,
     texture_quality: float | None = None,
     texture_codec: str | None = None,
@@ -181,12 +189,16 @@ def encode(
 
     At most one target may be given. Then the quality is searched; see `gvpipe.rate_control.search`.
 
+    Where vertices or triangles change, the file is a capture: each run of frames that keeps them is a shot, coded as a sequence
+    is (`gvpipe.open_capture` reads it). Targets then hold in each shot; parts of the diagonal are of the capture's first frame.
+
     Args:
-        source: a sequence, or what `read` takes.
+        source: a sequence, a capture, or what `read` takes.
         path: the ``.mp4`` to write; an older file is replaced once the new one is complete.
         codec: its id, with ``settings`` by name, or its settings object. Several, or ``"auto"`` for all that serve the purpose
             with settings that all have: the one with the smallest file that meets the target, by default the KG error of their
-            quality (`gvpipe.coding.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``.
+            quality (`gvpipe.coding.quality_scale`). None: ``"auto"`` if a purpose is given, else ``"mcgv"``, and ``"pca"``
+            for captures, whose shots are short.
         progress: called with a stage's name and the part of it that is done.
         fps: overrides the source's frames per second.
         target_rmse: largest root mean square error, as a part of frame 0's diagonal.
@@ -201,7 +213,9 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp, volume, texture: as for `read`. A sequence's volume is always coded.
+        clip, mesh, frames, unlimited, real_time, warp, texture: as for `read`.
+        volume: whether what lies inside of a simulation's surface is coded, too. None: of a sequence or a geometry video, yes;
+            of other files, if it takes less than a third of the other bytes. A note says what was chosen.
         texture_quality: of textures with a picture for each frame, 0..100, higher is better; None: 75.
         texture_codec: of these: ``"h264"``, which all browsers play, ``"hevc"``, ``"av1"``, or ``"copy"`` for the pictures of a
             video as they are coded. None: ``"copy"`` for a video of H.264 where no quality is given, else ``"h264"``.
@@ -227,7 +241,8 @@ def encode(
     check_video_target(path, "gvpipe.encode's path")
     _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
     sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
-    given = _candidates(codec, settings, purpose)
+    request = _Request(codec, settings, purpose, (target_rmse, target_kg, target_bpvf, max_error))
+    given = request.candidates()
     is_shared = workers == AUTO_WORKERS and scheduler is None
     if workers == AUTO_WORKERS:
         workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
@@ -236,19 +251,35 @@ def encode(
     moving = MovingCoding(texture_codec, texture_quality)
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = _StageClock(progress)
+    layout = STREAM if stream else BARE if bare else PLAIN
     with open_executor(scheduler, workers) as executor:
-        options = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited, "real_time": real_time, "warp": warp}
-        options["volume"] = volume
-        sequence = with_sound(_open_source(source, path, fps, options), sounds, frames)
-        sequence = sequence if texture is None else add_texture(sequence, texture, frames)
-        if memory is not None:
-            given = fit_segments(given, sequence.n_vertices, memory)
-        target = _target(sequence, target_rmse, target_kg, target_bpvf, max_error)
-        asset = AssetCoder(sequence, AssetOptions.of(attributes, fields, textures, moving))
-        with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
-            coded = _code(sequence, given, target, asset, bare, clock)
-    size, bitstream = _write(sequence, coded, path, clock, STREAM if stream else BARE if bare else PLAIN)
+        options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
+        options |= {"real_time": real_time, "warp": warp}
+        beside = AssetOptions.of(attributes, fields, textures, moving)
+        if isinstance(source, Capture):
+            capture = _some_of(source, frames, fps)
+            capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
+            return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
+        try:
+            sequence, spares_volume, chosen = _open_with_inside(source, path, fps, options, volume)
+            sequence = with_sound(sequence, sounds, frames)
+            sequence = sequence if texture is None else add_texture(sequence, texture, frames)
+            options["volume"] = sequence.volume is not None
+            if memory is not None:
+                given = fit_segments(given, sequence.n_vertices, memory)
+            target = _target(sequence, *request.targets)
+            asset = AssetCoder(sequence, dataclasses.replace(beside, spares_volume=spares_volume))
+            with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
+                coded = _code(sequence, given, target, asset, bare, clock)
+        except TopologyChange:
+            if isinstance(source, MeshSequence):
+                raise
+            capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
+            capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
+            return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
+    size, bitstream = _write(sequence, coded, path, clock, layout)
     clock("", 1.0)
+    chosen += () if asset.volume_choice is None else (asset.volume_choice.note,)
     return Report(
         codec=coded.codec.id,
         settings=dataclasses.asdict(coded.codec),
@@ -259,14 +290,108 @@ def encode(
         bytes=size,
         bpvf=8 * size / (bitstream.n_vertices * bitstream.n_frames),
         seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
-        not_carried=[*sorted(asset.plan.left_out), *sequence.not_carried],
+        not_carried=[*sorted(asset.plan.left_out), *asset.carried.not_carried],
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *_refusal(path, bitstream, size)],
+        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *chosen, *_refusal(path, bitstream, size)],
         audio=None if asset.sound is None else asset.sound.to_json(),
         errors={} if coded.errors is None else dataclasses.asdict(coded.errors),
     )
+
+
+@dataclass(frozen=True)
+class _Request:
+    """What was asked for: a codec or some, their settings, a purpose, and the values of `TARGETS`."""
+
+    codec: str | Codec | Sequence[Codec] | None
+    settings: dict[str, Any]
+    purpose: str | None
+    targets: tuple[float | None, float | None, float | None, float | str | None]
+
+    def candidates(self, default: str | None = None) -> Codec | Sequence[Codec]:
+        """The settings object of the codec, or of all to choose from; ``default`` where neither codec nor purpose is given."""
+        codec = default if self.codec is None and self.purpose is None else self.codec
+        return _candidates(codec, self.settings, self.purpose)
+
+
+def _encode_capture(
+    capture: Capture,
+    request: _Request,
+    path: StrPath,
+    beside: AssetOptions,
+    sounds: AudioOptions,
+    frames: tuple[int, int | None] | None,
+    memory: int | None,
+    layout: str,
+    clock: _StageClock,
+) -> Report:
+    """Encode each shot as a sequence."""
+    from gvpipe.asset_coding.encoder import AssetCoder
+
+    if layout == BARE:
+        raise SettingError(f"{capture.name}: vertices or triangles change; bare files keep them: leave out bare (--bare)")
+    diagonal = frame_diagonal(capture.shots[0])
+    given = request.candidates(CAPTURE_CODEC if _knows(CAPTURE_CODEC, request.settings) else None)
+    is_free = request.codec is None and request.purpose is None and "reorder" not in request.settings
+
+    def code(shot: MeshSequence, progress: Progress) -> CodedShot:
+        fitting = given if memory is None else fit_segments(given, shot.n_vertices, memory)
+        if is_free and len(shot) == 1 and isinstance(fitting, Codec):  # nobody knows its vertices from other frames
+            fitting = dataclasses.replace(fitting, reorder=True)
+        target = _shot_target(shot, request.targets, diagonal)
+        asset = AssetCoder(shot.with_sound(None), beside)
+        coded = _code(shot, fitting, target, asset, True, progress)
+        x, y, z = shot.origin.tolist()
+        bitstream = dataclasses.replace(coded.encoded.bitstream, origin=(x, y, z), is_bare=True)
+        if coded.check is not None:
+            coded.check(read_bytes(file_bytes(bitstream), os.fspath(path)))
+        left_out = [*sorted(asset.plan.left_out), *shot.not_carried]
+        return CodedShot(bitstream, coded.codec, _notes(shot, target, asset.plan), left_out)
+
+    sound, heard = sound_beside(capture.sound, len(capture) / capture.fps, sounds, capture.fps, frames)
+    sound, damaged = whole_sound(sound)
+    companions = () if sound is None else (pack_sound(sound),)
+    found = write_capture(capture, path, code, clock, layout == STREAM, companions)
+    clock("", 1.0)
+    first, size = found.coded[0], found.written.size
+    many = [notes.shots(capture.name, len(capture.shots), capture.starts[1])] if len(capture.shots) > 1 else []
+    return Report(
+        codec=first.codec.id,
+        settings=dataclasses.asdict(first.codec),
+        vertices=max(row["vertices"] for row in found.shots),
+        triangles=max(row["triangles"] for row in found.shots),
+        frames=len(capture),
+        fps=capture.fps,
+        bytes=size,
+        bpvf=8 * size / found.n_samples,
+        seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
+        not_carried=found.not_carried,
+        sections={**found.written.sections, "container": size - sum(found.written.sections.values())},
+        tried=[],
+        reason="",
+        notes=[*many, *heard, *damaged, *found.notes],
+        shots=found.shots,
+        audio=None if sound is None else sound.to_json(),
+    )
+
+
+def _knows(codec: str, settings: Mapping[str, Any]) -> bool:
+    """Whether a codec has settings of these names."""
+    return settings.keys() <= {each.name for each in dataclasses.fields(codec_class(codec))}
+
+
+def _shot_target(
+    shot: MeshSequence, targets: tuple[float | None, float | None, float | None, float | str | None], diagonal: float
+) -> Target | None:
+    """The target of a shot; parts of a diagonal are of the capture's, model units."""
+    rmse, kg, bpvf, bound = targets
+    own = frame_diagonal(shot)
+    if rmse is not None and own > 0:
+        rmse *= diagonal / own
+    if bound is not None and read_bound(bound)[1] and own > 0:
+        bound = f"{read_bound(bound)[0] * diagonal / own!r}%"
+    return _target(shot, rmse, kg, bpvf, bound)
 
 
 KEYWORDS = tuple(name for name in signature(encode).parameters if name != "settings")
@@ -280,11 +405,12 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
 
     Raises:
         InputError: no such file, or the frames or the level are not in it.
+        SeveralShots: the frames are of several shots of a capture, which `open_capture` reads.
         FormatError: not a geometry video, or a damaged one.
     """
-    player = Player(path, unlimited=unlimited)
+    player, shift = _player_of(path, start, stop, unlimited)
     first_kernels.expect(player.bitstream.codec)
-    start, stop = frame_range(player, start, stop)
+    start, stop = frame_range(player, start - shift, None if stop is None else stop - shift)
     if lod:
         whole = player.level(lod)
         positions = whole.read(start, stop)
@@ -293,6 +419,18 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
     images = tuple(image.part(start, stop) for image in whole.images)
     return dataclasses.replace(whole, positions=positions, fields=fields, images=images, sound=whole.sound_of(start, stop))
+
+
+def _player_of(path: StrPath, start: int, stop: int | None, unlimited: bool) -> tuple[Player, int]:
+    """What has some frames, and the first one's number: a geometry video, or a shot of a capture."""
+    try:
+        return Player(path, unlimited=unlimited), 0
+    except SeveralShots:
+        video = CapturePlayer(path, unlimited=unlimited)
+        (number, _, _), *others = video.capture().spans(start, stop)
+        if others:
+            raise
+        return video.shot(number), video.starts[number]
 
 
 def restream(
@@ -329,7 +467,10 @@ def restream(
         raise InputError(f"layout is {layout!r}; {PLAIN} or {STREAM} is needed")
     check_video_target(path, "gvpipe.restream's path")
     sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
-    bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    try:
+        bitstream = read_file(check_path(source, "the geometry video"), unlimited)
+    except SeveralShots:
+        return _restream_capture(source, path, layout, unlimited, sounds)
     kept = bitstream.layout if not sounds.is_empty and bitstream.layout in (PLAIN, STREAM) else None
     chosen = layout or kept or (STREAM if bitstream.layout in (PLAIN, LIVE) else PLAIN)
     bitstream, said = _with_audio(bitstream, os.fspath(source), sounds)
@@ -344,13 +485,27 @@ def restream(
     return Restreamed(chosen, bitstream.n_bytes, size, [*bitstream.lost, *said])
 
 
+def _restream_capture(source: StrPath, path: StrPath, layout: str | None, unlimited: bool, sounds: AudioOptions) -> Restreamed:
+    """Copy a capture with another sound."""
+    if layout is not None or sounds.is_empty:
+        raise InputError(f"{source} is a capture, whose index comes first in any case; it needs no other layout")
+    video = CapturePlayer(source, unlimited=unlimited)
+    index = video.index
+    assert index is not None
+    with in_file(os.fspath(source)):
+        sound, said = sound_beside(video.sound, len(video) / video.fps, sounds)
+        others = tuple(each for each in index.companions if each.kind != SOUND_KIND)
+        size = copy_shots(index, path, (*(() if sound is None else (pack_sound(sound),)), *others))
+    return Restreamed(SHOTS, index.size, size, [*index.lost, *said])
+
+
 def _with_audio(bitstream: Bitstream, name: str, sounds: AudioOptions) -> tuple[Bitstream, tuple[str, ...]]:
     """A file's bitstream with the sound that is asked for, and what is said of it; ``name`` is the file's."""
     if sounds.is_empty:
         return bitstream, ()
     others = tuple(each for each in bitstream.companions if each.kind != SOUND_KIND)
     with in_file(name):
-        sound, said = sound_beside(read_sound_track(bitstream)[0], bitstream.n_frames / bitstream.fps, sounds)
+        sound, said = sound_beside(read_sound_track(bitstream.companions)[0], bitstream.n_frames / bitstream.fps, sounds)
         own = () if sound is None else (pack_sound(sound),)
     return dataclasses.replace(bitstream, companions=(*own, *others)), said
 
@@ -360,23 +515,34 @@ def open(path: StrPath, *, unlimited: bool = False, shared: Callable[[str], byte
     return Player(path, unlimited=unlimited, shared=shared)
 
 
+def open_capture(path: StrPath, *, unlimited: bool = False) -> CapturePlayer:
+    """Open a geometry video of one shot or several, whose vertices and triangles may change; see `CapturePlayer`."""
+    return CapturePlayer(path, unlimited=unlimited)
+
+
 def compare(
-    reference: MeshSequence | Player | Source,
-    distorted: MeshSequence | Player | Source,
+    reference: MeshSequence | Capture | Player | CapturePlayer | Source,
+    distorted: MeshSequence | Capture | Player | CapturePlayer | Source,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    surface: bool | None = None,
 ) -> Comparison:
-    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+    """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
     Args:
-        reference: the original, a player, or what `read` takes; lengths are divided by its size. Where one of both has a
-            volume, the other is read with what lies inside of it.
-        distorted: as many frames and vertices, the same triangles in any order; or what `read` takes, such as a geometry video.
+        reference: the original, a capture, a player, or what `read` takes; lengths are divided by its size. Where one of both
+            has a volume, the other is read with what lies inside of it.
+        distorted: as many frames, of the same vertices and triangles in any order, or of others; or what `read` takes, such as
+            a geometry video.
         progress: called with (frames done, frames in all) after each block.
+        surface: True: the distance of the surfaces too, whose triangles need not correspond; False: never; None: where vertices
+            do not correspond. Of captures, surfaces are compared.
 
     Raises:
-        InputError: one cannot be read, or the two differ in their number of frames or vertices or in their triangles, so that
-            vertices do not correspond.
-        TypeError: one of them is neither a sequence, a player nor a path.
+        InputError: one cannot be read, they differ in their number of frames, vertices do not correspond and ``surface`` is
+            False, or surfaces are needed and one side has no triangles.
+        TopologyChange: vertices or triangles of one change, and ``surface`` is False.
+        TypeError: one of them is neither a sequence, a capture, a player nor a path.
 
     Examples:
         >>> import numpy as np
@@ -388,16 +554,34 @@ def compare(
         (0.5, 0.1)
     """
     from gvpipe.metrics.comparison import compare as measure
+    from gvpipe.metrics.comparison import compare_captures
 
     given = {"reference": reference, "distorted": distorted}
     for role, one in given.items():
-        if not isinstance(one, MeshSequence | Player | str | os.PathLike | list | tuple):
+        if not isinstance(one, MeshSequence | Capture | Player | CapturePlayer | str | os.PathLike | list | tuple):
             raise TypeError(f"compare's {role} is {show(one)}; a MeshSequence, a Player or a path is needed")
-    both = [_as_sequence(one) for one in given.values()]
-    if any(each.volume is not None for each in both):
-        pairs = zip(given.values(), both, strict=True)
-        both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-    return measure(both[0], both[1], progress)
+    if isinstance(reference, Capture | CapturePlayer) or isinstance(distorted, Capture | CapturePlayer):
+        return compare_captures(_as_capture(reference), _as_capture(distorted), progress)
+    try:
+        both = [_as_sequence(one) for one in (reference, distorted)]
+        if any(each.volume is not None for each in both):
+            pairs = zip((reference, distorted), both, strict=True)
+            both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
+        return measure(both[0], both[1], progress, surface=surface).of(reference, distorted)
+    except TopologyChange:
+        if surface is False:
+            raise
+        return compare_captures(_as_capture(reference), _as_capture(distorted), progress)
+
+
+def _as_capture(given: MeshSequence | Capture | Player | CapturePlayer | Source) -> Capture:
+    if isinstance(given, Capture):
+        return given
+    if isinstance(given, CapturePlayer):
+        return given.capture()
+    if isinstance(given, MeshSequence | Player):
+        return Capture([_as_sequence(given)])
+    return read_capture(given)
 
 
 def _as_sequence(given: MeshSequence | Player | Source, volume: bool = False) -> MeshSequence:
@@ -452,7 +636,7 @@ def skin(
 
 
 def render(
-    source: MeshSequence | StrPath,
+    source: MeshSequence | Capture | StrPath,
     path: StrPath,
     *,
     frame: int | None = None,
@@ -484,7 +668,7 @@ def render(
     Materials, textures and vertex colours show if the sequence has them.
 
     Args:
-        source: a sequence, or what `gvpipe.read` takes.
+        source: a sequence, a capture, or what `gvpipe.read` takes; vertices and triangles may change.
         path: the file to write; an older one is replaced once the new one is complete.
         frame: the only frame to paint, of ``frames``, negative from the end; by default the first for a PNG, all for a film.
         size: pixels, one number for a square or ``(width, height)``; even for MP4.
@@ -515,6 +699,7 @@ def render(
             part, a texture without its uv attribute.
         OutputError: the file cannot be written; no part of it is left.
     """
+    from gvpipe.rendering.capture_films import write_capture_pictures
     from gvpipe.rendering.films import PictureOptions, check_output, write_pictures
 
     check_target(path)
@@ -543,12 +728,27 @@ def render(
         if given is not None and _is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
-    if isinstance(source, MeshSequence):
-        sequence = source if frames is None else source.part(*frame_range(source, *frames))
-        sequence = sequence if fps is None else sequence.with_fps(fps)
-    else:
-        sequence = read(source, fps, clip, mesh, frames, unlimited=unlimited, volume=cut is not None)
-    return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
+    if isinstance(source, Capture):
+        return list(write_capture_pictures(_some_of(source, frames, fps), target, options, progress))
+    reading: dict[str, Any] = {"unlimited": unlimited, "volume": cut is not None}
+    try:
+        if isinstance(source, MeshSequence):
+            sequence = source if frames is None else source.part(*frame_range(source, *frames))
+            sequence = sequence if fps is None else sequence.with_fps(fps)
+        else:
+            sequence = read(source, fps, clip, mesh, frames, **reading)
+        return list(dict.fromkeys([*sequence.notes, *write_pictures(sequence, target, options, reference, progress)]))
+    except TopologyChange:
+        if isinstance(source, MeshSequence) or reference is not None:
+            raise
+    capture = read_capture(source, fps, clip, mesh, frames, **reading)
+    return list(write_capture_pictures(capture, target, options, progress))
+
+
+def _some_of(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:
+    """Some frames of a capture, at another rate."""
+    capture = capture if frames is None else capture.part(*frames)
+    return capture if fps is None else capture.with_fps(fps)
 
 
 def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywords: Any) -> dict[str, Any]:
@@ -621,6 +821,26 @@ def _open_source(
     return read(source, fps, **options)
 
 
+def _open_with_inside(
+    source: MeshSequence | Source, path: StrPath, fps: float | None, options: dict[str, Any], volume: bool | None
+) -> tuple[MeshSequence, bool, tuple[str, ...]]:
+    """The sequence to encode, whether its volume is left out where it costs too much, and a note on what was chosen by now."""
+    from gvpipe.asset_coding.volume_choice import MOST_NUMBERS, count_note, times_the_surface, without_volume
+
+    sequence = _open_source(source, path, fps, {**options, "volume": bool(volume)})
+    if volume is False:
+        return without_volume(sequence), False, ()
+    times = times_the_surface(sequence)
+    if volume or isinstance(source, MeshSequence) or times is None or sequence.volume is not None:
+        return sequence, False, ()
+    if times > MOST_NUMBERS:
+        return sequence, False, (count_note(times),)
+    try:
+        return read(source, fps, **{**options, "volume": True}), True, ()
+    except InputError:  # of what lies inside alone
+        return sequence, False, ()
+
+
 @contextlib.contextmanager
 def _segments_coded_by(
     executor: Executor | None, sequence: MeshSequence, source: MeshSequence | Source, options: dict[str, Any], is_shared: bool
@@ -640,9 +860,10 @@ def _segments_coded_by(
         yield
 
 
-def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Source) -> bool:
+def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Capture | Source) -> bool:
     """Whether workers may code segments: of a source that they can read, by a codec whose segments are independent."""
-    return isinstance(given, Codec) and given.maps_segments and not isinstance(source, MeshSequence) and count_cores() > 1
+    is_path = not isinstance(source, MeshSequence | Capture)
+    return isinstance(given, Codec) and given.maps_segments and is_path and count_cores() > 1
 
 
 def _absolute(source: Source) -> Source:
@@ -736,9 +957,9 @@ def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
     return []
 
 
-def _is_among(path: StrPath, source: MeshSequence | Source) -> bool:
+def _is_among(path: StrPath, source: MeshSequence | Capture | Source) -> bool:
     """Whether the output is one of the inputs."""
-    if isinstance(source, MeshSequence) or not os.path.exists(path):
+    if isinstance(source, MeshSequence | Capture) or not os.path.exists(path):
         return False
     sources = [source] if isinstance(source, str | os.PathLike) else source
     return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)

@@ -12,6 +12,7 @@ from gvpipe.foundation.errors import NotGeometryVideo as NotGeometryVideo
 from gvpipe.foundation.errors import OutputError as OutputError
 from gvpipe.foundation.errors import OverBudget as OverBudget
 from gvpipe.foundation.errors import SettingError as SettingError
+from gvpipe.foundation.errors import SeveralShots as SeveralShots
 from gvpipe.foundation.errors import StrippedFile as StrippedFile
 from gvpipe.foundation.errors import TopologyChange as TopologyChange
 from gvpipe.foundation.errors import TruncatedFile as TruncatedFile

@@ -27,7 +27,7 @@ OLD_MODULES = {  # of the flat layout
         trials vertex_errors vertex_order video welding rendering.camera rendering.colours rendering.renderer
         rendering.raster_kernels rendering.shading_kernels rendering.pictures
         ahead arguments arrays atomic blas borrowing budget coarse_asset compiled corrections files forks frame_cache
-        frame_views isolation lanes live machine_code notebook notes origin part_choice player quality_scale registry
+        frame_views isolation lanes live machine_code notes origin part_choice player quality_scale registry
         repeated_frames segment_map segment_memory sequence shared_parts shared_reader source_info text version video_info
         warmup
     """,

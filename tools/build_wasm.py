@@ -67,11 +67,16 @@ DELTA_ORDER = ("gvcodecs.laplacian.delta_kernels.DeltaOrder", [INTS] * 3)
 MEMBERS = ("gvcodecs.pdct.shape_kernels.Members", [LONGS] * 3)
 SHAPE = ("gvcodecs.pdct.shape_kernels.Shape", [ROWS, ROWS, FLOATS])
 LOCAL_FRAMES = ("gvcodecs.pdct.shape_kernels.LocalFrames", ["float64[3]", "float64[3]"])
+POSES = (
+    "gvpipe.connectivity.cell_poses.Poses",
+    ["int64[4]", NUMBERS, "int64[3]", LONGS, "int64[3]", "int64[3]", NUMBERS],
+)
+CELLS = ("gvpipe.connectivity.cell_kernels.Source", [LONGS, NUMBERS, NUMBERS, LONGS])
 DELTA_LAYOUT = ("gvcodecs.pdct.delta_kernels.Layout", [LONGS] * 3)
 LEARNING = ("gvcodecs.pdct.delta_kernels.Learning", [NUMBERS, NUMBERS, NUMBERS, LONGS, LONGS, LONGS, NUMBERS, NUMBERS, LONGS])
 DELTAS = ("gvcodecs.pdct.delta_kernels.DeltaStream", ["uint64[1]", "uint32[1]", BYTES, LONGS])
 WORDS = ["uint64[1]", "uint32[1]"]  # a range decoder's state and its words
-KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and NamedTuples of both
+KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, NamedTuples of both, and tuples as lists
     "gvpipe.mesh.hierarchy_kernels.build_order": [TRIANGLES, SCALAR, SCALAR],
     "gvpipe.mesh.graph_kernels.label_components": [GRAPH],
     "gvpipe.mesh.graph_kernels.link_vertices": [TRIANGLES, SCALAR],
@@ -85,6 +90,15 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, and 
     "gvpipe.connectivity.visit_kernels.traverse_visits": [LISTS, SCALAR, VISITS, "bool"],
     "gvpipe.connectivity.order_kernels.code_visits": [LISTS, LONGS, SCALAR, MIXING, LONGS, BYTES, "bool", LONGS],
     "gvpipe.connectivity.position_kernels.code_positions": [ENTRIES, MIXING, LONGS, BYTES, "bool", NUMBERS],
+    "gvpipe.connectivity.cell_kernels.code_cells": [
+        SERIAL,
+        POSES,
+        CELLS,
+        NUMBERS,
+        LONGS,
+        [SCALAR] * 3,
+        "bool",
+    ],
     "gvpipe.connectivity.edge_seam_kernels.visit_corners": [SEAMS, LONGS, LONGS, LONGS, SCALAR],
     "gvpipe.attributes.linear_kernels.code_linear": [
         SERIAL,
@@ -276,6 +290,8 @@ def numba_type(argument: Any) -> Any:
     """numba's type of an argument of `KERNELS`."""
     from numba import types
 
+    if isinstance(argument, list):
+        return types.Tuple([numba_type(field) for field in argument])
     if not isinstance(argument, str):
         path, fields = argument
         return types.NamedTuple([numba_type(field) for field in fields], load(path))
@@ -289,7 +305,7 @@ def unpacked(argument: Any) -> Iterator[str]:
     if isinstance(argument, str):
         yield argument
     else:
-        for field in argument[1]:
+        for field in argument if isinstance(argument, list) else argument[1]:
             yield from unpacked(field)
 
 

@@ -197,7 +197,7 @@ def is_known(listed: Listed) -> bool:
 def file_notes(directory: Directory, bitstream: Bitstream) -> tuple[str, ...]:
     """What a user should know of a file, a line each."""
     unfinished = (UNFINISHED,) if bitstream.is_unfinished else ()
-    _, silent = read_sound(bitstream)
+    _, silent = read_sound(bitstream.companions)
     skipped = directory.skipped
     newer = f"a newer gvpipe wrote beside the positions what this one skips: {', '.join(skipped)}"
     return (*unfinished, *((printable(newer),) if skipped else ()), *map(printable, (*bitstream.lost, *silent)))

@@ -6,8 +6,10 @@ depend on its connectivity alone, and are coded once for all encodes of a search
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +45,7 @@ from gvpipe.asset_coding.scan import WHOLE_KINDS, are_whole, longest_vector
 from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
 from gvpipe.asset_coding.times import SECTION as TIMES
 from gvpipe.asset_coding.times import pack_times
+from gvpipe.asset_coding.volume_choice import VolumeChoice, without_volume
 from gvpipe.asset_coding.volume_encoder import Shown, VolumeCoder
 from gvpipe.attributes.attribute_coding import encode_attribute
 from gvpipe.attributes.corner_sharing import entries_of
@@ -58,6 +61,7 @@ from gvpipe.fields.mesh import FieldMesh
 from gvpipe.fields.octahedral import angular_bound, to_octahedral
 from gvpipe.fields.values import FieldBound
 from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.foundation.errors import InputError
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.runtime.forks import kept
 
@@ -151,11 +155,32 @@ class AssetCoder:
         self.plan = plan_asset(sequence, options)
         volume = sequence.volume
         kept = {**self.plan.attributes, **self.plan.fields}
-        self._volume = None if volume is None else VolumeCoder(sequence, volume, options, kept)
         self.sound, self.sound_notes = whole_sound(sequence.sound)
         self._companions = () if self.sound is None else (pack_sound(self.sound),)
+        self._spares_volume = options.spares_volume
+        self.volume_choice: VolumeChoice | None = None  # of the bitstream that was made last, where its bytes decide
+        self._volume = None
+        if volume is not None:
+            with self._spared():
+                self._volume = VolumeCoder(sequence, volume, options, kept)
         self._fields: dict[tuple[str, bytes], bytes] = {}
         self._meshes: dict[tuple[str, bytes], FieldMesh] = {}
+
+    @property
+    def carried(self) -> MeshSequence:
+        """The sequence, without its volume where the bitstream that was made last leaves that out."""
+        choice = self.volume_choice
+        return self._sequence if choice is None or choice.is_carried else without_volume(self._sequence)
+
+    @contextlib.contextmanager
+    def _spared(self) -> Iterator[None]:
+        """Leave out a volume that cannot be coded, where nobody asked for it."""
+        try:
+            yield
+        except InputError as exc:
+            if not self._spares_volume:
+                raise
+            self.volume_choice = VolumeChoice(problem=str(exc))
 
     @property
     def is_empty(self) -> bool:
@@ -192,8 +217,15 @@ class AssetCoder:
         if self._volume is not None:
             shown = Shown(permutation, reader, arrangement.faces, arrangement.polygons)
             reorder = bool(getattr(codec, "reorder", False))
-            sections |= self._volume.sections(shown, sum(map(len, sections.values())), reorder, is_final)
-        metadata = _with_losses(self._sequence)
+            n_beside = sum(map(len, sections.values()))
+            with self._spared():
+                inside = self._volume.sections(shown, n_beside, reorder, is_final)
+                if self._spares_volume:
+                    n_inside = sum(map(len, inside.values()))
+                    self.volume_choice = VolumeChoice(n_inside, n_beside + len(encoded.bitstream.video))
+                if self.volume_choice is None or self.volume_choice.is_carried:
+                    sections |= inside
+        metadata = _with_losses(self.carried)
         if len(metadata.times) == encoded.bitstream.n_frames:
             sections[TIMES] = pack_times(metadata.times)
         images = []

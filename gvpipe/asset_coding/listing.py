@@ -49,7 +49,7 @@ def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> 
 
 
 def _audio(bitstream: Bitstream) -> dict[str, Any] | None:
-    sound, _ = read_sound(bitstream)
+    sound, _ = read_sound(bitstream.companions)
     return None if sound is None else sound.to_json()
 
 

@@ -166,7 +166,7 @@ class TrackPictures(PictureReader):
 
 
 def group_checksums(coded: CodedTrack) -> list[list[int]]:
-    """Return for each group of pictures their number, and the CRC-32 of their bytes, for readers that fetch some groups alone."""
+    """Return, for each group, how many pictures it has and the CRC-32 of their bytes, for readers that fetch some alone."""
     spans = itertools.pairwise(coded.starts)
     return [[stop - start, zlib.crc32(b"".join(coded.packets[start:stop]))] for start, stop in spans]
 

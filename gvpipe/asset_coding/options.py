@@ -18,12 +18,14 @@ class AssetOptions:
         attributes, fields: bounds by name (`gvpipe.asset_coding.bounds.precision`); others have the default.
         textures: what images may be.
         moving: how moving images are coded.
+        spares_volume: whether what lies inside is left out where it costs much (`gvpipe.asset_coding.volume_choice`).
     """
 
     attributes: Given = field(default_factory=dict)
     fields: Given = field(default_factory=dict)
     textures: TextureLimit = field(default_factory=TextureLimit)
     moving: MovingCoding = field(default_factory=MovingCoding)
+    spares_volume: bool = False
 
     @classmethod
     def of(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gvpipe.container.bitstream import Bitstream
+from collections.abc import Sequence
+
 from gvpipe.container.companion import Companion
 from gvpipe.foundation.errors import REMEDY, FormatError, InputError
 from gvpipe.foundation.notes import sound_left_out
@@ -17,9 +18,9 @@ def pack_sound(sound: Sound) -> Companion:
     return Companion.of(KIND, Sound.of(data).description, data)
 
 
-def read_sound(bitstream: Bitstream) -> tuple[Sound | None, tuple[str, ...]]:
-    """The sound of a file, None if it has none, and what is wrong with it, a line each; its samples are not read."""
-    for companion in bitstream.companions:
+def read_sound(companions: Sequence[Companion]) -> tuple[Sound | None, tuple[str, ...]]:
+    """The sound among the companions of a file, None if there is none, and what is wrong with it; its samples are not read."""
+    for companion in companions:
         if companion.kind == KIND:
             try:
                 return Sound.described(companion.about, companion.n_bytes, companion.file), ()

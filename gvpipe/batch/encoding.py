@@ -11,11 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gvpipe.foundation.errors import GvpipeError, InputError, printable
 from gvpipe.foundation.isolation.plain_files import open_plain
 from gvpipe.tasks.executor import Work
+
+if TYPE_CHECKING:
+    from gvpipe.api import Report
 
 BLOCK = 1 << 20  # bytes that are hashed at a time
 
@@ -66,9 +69,6 @@ def prepare(data: bytes) -> Work:
 def encode_one(keywords: dict[str, Any], task: Task) -> Done:
     """Encode a sequence, unless it is done; whatever goes wrong is returned as ``error``, one line."""
     from gvpipe import api
-    from gvpipe.container.mp4 import read_file
-    from gvpipe.datasets.entries import describe
-    from gvpipe.datasets.statistics import describe_positions
 
     started = time.perf_counter()
     found = None
@@ -78,8 +78,7 @@ def encode_one(keywords: dict[str, Any], task: Task) -> Done:
             return Done(found, None, os.path.getsize(task.target), time.perf_counter() - started, False)
         Path(task.target).parent.mkdir(parents=True, exist_ok=True)
         report = api.encode(task.source, task.target, **keywords)
-        bitstream = read_file(task.target, unlimited=True)
-        description = {**describe(bitstream), **describe_positions(bitstream), **report.errors}
+        description = _described(task.target, report)
     except GvpipeError as exc:
         error = str(exc)
     except MemoryError:
@@ -90,6 +89,19 @@ def encode_one(keywords: dict[str, Any], task: Task) -> Done:
         seconds = time.perf_counter() - started
         return Done(found, None, report.bytes, seconds, notes=tuple(report.notes), description=description)
     return Done(found, error, 0, time.perf_counter() - started)
+
+
+def _described(target: str, report: Report) -> dict[str, Any]:
+    """What a data set says of a file; of a capture, which goes into no data set, its numbers."""
+    from gvpipe.container.mp4 import read_file
+    from gvpipe.datasets.entries import describe
+    from gvpipe.datasets.statistics import describe_positions
+
+    if report.shots:
+        names = ("codec", "frames", "vertices", "triangles", "fps", "bytes")
+        return {**{name: getattr(report, name) for name in names}, "shots": len(report.shots)}
+    bitstream = read_file(target, unlimited=True)
+    return {**describe(bitstream), **describe_positions(bitstream), **report.errors}
 
 
 def hash_input(source: str, mesh: str | None = None) -> str:

@@ -24,6 +24,15 @@ def shape_lines(info: Info | SourceInfo) -> Iterator[str]:
     yield "frame 0 lies in " + " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True)) + place
 
 
+def shot_line(row: dict[str, Any]) -> str:
+    """What a shot of a capture is, of a row of `Info.shots`."""
+    from gvpipe.foundation.notes import count
+
+    span = f"frames {row['start']}:{row['start'] + row['frames']}"
+    size = f"{count(row['vertices'], 'vertex', 'vertices')}, {count(row['triangles'], 'triangle')}"
+    return f"shot of {span}: {size}, {row['codec']}, {row['bytes']} bytes"
+
+
 def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
     """Yield the lines; none for a file of positions and triangles alone."""
     if info.parts:

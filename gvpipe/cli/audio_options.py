@@ -14,7 +14,6 @@ from gvpipe.foundation.errors import FormatError
 
 if TYPE_CHECKING:
     from gvpipe.media.sound import Sound
-    from gvpipe.model.sequence import MeshSequence
 
 Command = Callable[..., None]
 
@@ -77,12 +76,11 @@ def sound_path(target: str, source: str, wanted: str | None) -> str | None:
     return str(Path(target).with_suffix(SUFFIX))
 
 
-def write_beside(sequence: MeshSequence, path: str | None, wanted: str | None) -> tuple[Sound | None, list[str]]:
-    """Write a sequence's sound to a path; returns what was written, None for nothing, and what a user should know."""
+def write_beside(sound: Sound | None, path: str | None, wanted: str | None) -> tuple[Sound | None, list[str]]:
+    """Write a sound to a path; returns what was written, None for nothing, and what a user should know."""
     from gvpipe.foundation.notes import sound_left_out
     from gvpipe.media.sound_files import write_sound
 
-    sound = sequence.sound
     if sound is None:
         return None, ["there is no sound in these frames; --audio-out writes nothing"] if wanted not in (None, NO_SOUND) else []
     if path is None:

@@ -124,9 +124,9 @@ def encode(
     read, too (s3://bucket/walk.npz). OUTPUT - is standard output.
     """
     from gvpipe import api
+    from gvpipe.captures.splitting import with_sounds, write_runs
     from gvpipe.cli.choices import parse_texture
     from gvpipe.cli.process import give_back_memory
-    from gvpipe.cli.splitting import with_sounds, write_runs
     from gvpipe.playback import files
 
     if len(sources) > 1 and (target != PIPE and not target.lower().endswith(VIDEO_SUFFIXES)):
@@ -152,7 +152,8 @@ def encode(
     with source_path(sources[0]) as first, target_path(target, ".mp4") as path, out.progress() as progress:
         source = first if len(sources) == 1 else list(sources)
         if split:
-            runs = files.read_runs(source, **asked.reading, unlimited=asked.unlimited)
+            reading = {**asked.reading, "volume": bool(asked.reading["volume"])}
+            runs = files.read_runs(source, **reading, unlimited=asked.unlimited)
             runs = with_sounds(runs, sound, asked.reading["frames"])
             written = write_runs(
                 runs, target, lambda run, own: api.encode(run.sequence, own, asked.codec, progress, **asked.making)
@@ -209,7 +210,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
         out.text(f"  {codec_name} at quality {tried['quality']:.4g}: {tried['bytes']} bytes, {measures}")
     if report.reason:
         out.text(report.reason)
-    _print_sections(out, report.sections, report.vertices * report.frames)
+    _print_sections(out, report.sections, round(8 * report.bytes / report.bpvf))
 
 
 @cli.command()
@@ -253,6 +254,7 @@ def decode(
     """
     from gvpipe import api
     from gvpipe.asset_coding.directory import UNFINISHED
+    from gvpipe.cli.captures import write_shots
     from gvpipe.cli.choices import chosen, chosen_frames
     from gvpipe.cli.skeletons import check_glb_options, skin_of_video
     from gvpipe.foundation import notes
@@ -268,15 +270,22 @@ def decode(
         check_sound_target(sound_target)
     first, last = chosen_frames(start, stop, frames)
     with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        player = api.open(given, unlimited=unlimited)
-        start, stop = files.frame_range(player, first, last)
+        video = api.open_capture(given, unlimited=unlimited)
+        (number, begin, end), *others = video.capture().spans(first, last)
+        if others:
+            asked = {"parts": parts, "compress": compress, "fps": fps, "lod": lod, "local": local, "skin": skin}
+            beside = (sound_target, audio_out)
+            write_shots(video.capture().part(first, last), source, target, path, first, asked, progress, out, beside)
+            return
+        player = video.shot(number)
+        start, stop = video.starts[number] + begin, video.starts[number] + end
         level = player.level(lod)
-        sequence = chosen(level.part(start, stop), parts, fps, "decode", progress)
-        found, said = skin_of_video(player, path, (start, stop), skin, is_whole=not parts and not lod)
+        sequence = chosen(level.part(begin, end), parts, fps, "decode", progress)
+        found, said = skin_of_video(player, path, (begin, end), skin, is_whole=not parts and not lod)
         tracks = write_tracks(player, texture_out) if texture_out else []
         silent = sequence.with_sound(None)
         noticed = [*said, *files.write(silent.local() if local else silent, path, start, found, compress)]
-        sound, heard = write_beside(sequence, sound_target, audio_out)
+        sound, heard = write_beside(sequence.sound, sound_target, audio_out)
     noticed += heard + [note for note in player.bitstream.lost if note not in noticed]
     noticed += [notes.origin_left_out(player.origin.tolist())] if local and player.origin.any() else []
     noticed += level.notes if lod else ()
@@ -413,7 +422,7 @@ def info(
 
     Of shards (shard.tar, 'shard-*.tar') it sums up the sequences, and checks each.
     """
-    from gvpipe.cli.asset_lines import asset_lines, shape_lines
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines, shot_line
     from gvpipe.cli.choices import parse_frames
     from gvpipe.playback import video_info
 
@@ -445,7 +454,9 @@ def info(
     for note in found.notes:
         out.note(note)
     out.text(f"{_size(found.bytes)}, {found.bpvf:.3f} bits per vertex and frame:")
-    _print_sections(out, found.sections, found.vertices * found.frames)
+    for row in found.shots:
+        out.text(shot_line(row))
+    _print_sections(out, found.sections, round(8 * found.bytes / found.bpvf))
 
 
 def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -> None:
@@ -470,6 +481,7 @@ def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -
 @click.option("--mesh", metavar="FILE", help="The triangles of point caches (.pc2, .mdd, .npy), of either side.")
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1, of DISTORTED too unless it holds just as many.")
 @click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
+@click.option("--surface", is_flag=True, help="The distance of the surfaces, too. [default: where vertices do not correspond]")
 @unlimited_option
 @output_options
 def compare(
@@ -480,10 +492,14 @@ def compare(
     mesh: str | None,
     frames: str | None,
     fps: float | None,
+    surface: bool,
     unlimited: bool,
     out: Output,
 ) -> None:
-    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input."""
+    """Measure how far DISTORTED is from REFERENCE; both are sequences or geometry videos, one may be - for standard input.
+
+    Where their vertices do not correspond, surfaces are compared: the distance of each from the other.
+    """
     from gvpipe.cli.choices import parse_frames
     from gvpipe.metrics import comparison
     from gvpipe.playback import files
@@ -495,27 +511,44 @@ def compare(
     with source_path(reference) as one, source_path(distorted) as other, out.progress() as progress:
         read_given = partial(files.read, one, fps, clip, its_mesh, span, unlimited=unlimited)
         read_other = partial(files.read, other, None, other_clip, other_mesh, unlimited=unlimited)
-        given = read_given()
-        compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-        if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
-            read_other = partial(read_other, volume=True)
-            given = given if given.volume is not None else read_given(volume=True)
+
+        def show_progress(done: int, of: int) -> None:
+            if progress:
+                progress("compare", done / of)
+
+        try:
+            given = read_given()
             compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-        result = comparison.compare(
-            given,
-            compared,
-            lambda done, of: progress("compare", done / of) if progress else None,
-        )
+            if (given.volume is None) != (compared.volume is None):  # of one, what lies inside was not read
+                read_other = partial(read_other, volume=True)
+                given = given if given.volume is not None else read_given(volume=True)
+                compared = read_other() if span is None else _same_frames(read_other, span, len(given))
+            result = comparison.compare(given, compared, show_progress, surface=surface or None)
+        except TopologyChange:
+            capture = files.read_capture(one, fps, clip, its_mesh, span, unlimited=unlimited)
+            whole = files.read_capture(other, None, other_clip, other_mesh, unlimited=unlimited)
+            part = whole if span is None or len(whole) == len(capture) else whole.part(*span)
+            result = comparison.compare_captures(capture, part, show_progress)
     values = result.to_json()
     out.json(values)
-    for name, value in values.items():
-        if name not in ("frames", "attributes", "fields", "volume"):
-            out.text(f"{name:<14} {'not defined' if value is None else format(value, '.6g')}")
+    if result.unpaired:
+        out.note(f"surfaces alone are compared: {result.unpaired}")
+    else:
+        _print_numbers(out, {name: value for name, value in values.items() if name != "surface"})
+    if result.surface is not None:
+        _print_numbers(out, result.surface.to_json(), "surface ")
     for kind, errors in (("attribute", result.attributes), ("field", result.fields), ("inside", result.volume)):
         for name, error in errors.items():
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+def _print_numbers(out: Output, values: dict[str, Any], prefix: str = "") -> None:
+    """A line for each number, by its name."""
+    for name, value in values.items():
+        if value is None or isinstance(value, int | float):
+            out.text(f"{prefix + name:<{14 + len(prefix)}} {'not defined' if value is None else format(value, '.6g')}")
 
 
 def _meshes(paths: tuple[str, str], mesh: str | None) -> list[str | None]:

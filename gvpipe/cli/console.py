@@ -127,7 +127,10 @@ def texture_options(command: Command) -> Command:
 
 
 volume_option = click.option(
-    "--volume", is_flag=True, help="Keep what lies inside of a simulation's surface: volume cells, points and their numbers."
+    "--volume/--no-volume",
+    default=None,
+    help="Keep what lies inside of a simulation's surface: volume cells, points and their numbers. "
+    "[default: encode: if that takes less than a third of the other bytes; convert: if OUTPUT can hold it]",
 )
 warp_option = click.option(
     "--warp", metavar="NAME[:SCALE]", help="Move vertices by a field of displacements, SCALE times as far. [default scale: 1]"

@@ -22,7 +22,7 @@ from gvpipe.cli.console import (
     warp_option,
 )
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
-from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.foundation.notes import shape as shape_of
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def convert(
     max_error: str | None,
     real_time: bool,
     warp: str | None,
-    volume: bool,
+    volume: bool | None,
     compress: str,
     texture: str | None,
     texture_video: str | None,
@@ -104,6 +104,7 @@ def convert(
     INPUT is what `gvpipe encode` takes; OUTPUT is what `gvpipe decode` takes. No codec is between, so that nothing changes but
     what a format cannot hold, which is said.
     """
+    from gvpipe.cli.captures import write_shots
     from gvpipe.cli.choices import chosen, chosen_frames, parse_frames, parse_texture
     from gvpipe.cli.skeletons import (
         ALL,
@@ -115,7 +116,7 @@ def convert(
         read_clips,
         smaller_without,
     )
-    from gvpipe.io.writing import is_glb, takes_skin
+    from gvpipe.io.writing import HOLD_VOLUMES, is_glb, takes_skin
     from gvpipe.playback import files
 
     out = out.carrying(target)
@@ -127,6 +128,8 @@ def convert(
     number, is_rigid = parse_joints(joints)
     wanted = SkinOptions(number, target_kg, max_error, is_rigid, correctives)
     check_glb_options(target, skin, compress, wanted)
+    if volume is None and Path(target).suffix.lower() not in HOLD_VOLUMES:
+        volume = False
     how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
     if split:
         if clip == ALL or lod or start is not None or stop is not None or target == PIPE:
@@ -136,32 +139,43 @@ def convert(
         options = {"fps": fps, "clip": clip, "mesh": mesh, "frames": parse_frames(frames), **how}
         _convert_split(source, target, options, parts, wanted if skin else None, compress, out)
         return
-    with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
-        read = (
-            _level_reader(given, lod, unlimited)
-            if lod
-            else partial(files.read, given, clip=clip, mesh=mesh, texture=shown_by, **how)
-        )
-        clips: tuple[Clip, ...] = ()
-        if clip == ALL and (names := clip_names(given)):
-            if not (skin and is_glb(target)) or (first, last) != (0, None) or mesh is not None:
-                raise click.UsageError(
-                    "--clip all is for --skin, a .glb and whole clips: without --start, --stop, --frames, --mesh"
-                )
-            some, clips = read_clips(names, lambda name, rate: files.read(given, rate, name), fps)
-            start, stop = 0, len(some)
-        elif frames is not None:
-            some = read(fps=fps, frames=(first, last))
-            start, stop = first, first + len(some)
-        else:
-            whole = read(fps=fps)
-            start, stop = files.frame_range(whole, first, last)
-            some = whole.part(start, stop)
-        sequence = chosen(some, parts, None, "convert", progress)
-        found, said = find_skin(sequence, path, wanted, progress) if skin else (None, [])
-        found = found and replace(found, clips=clips)
-        noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
-        noticed += smaller_without(path, sequence, compress) if found and not found.clips else []
+    try:
+        with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
+            read = (
+                _level_reader(given, lod, unlimited)
+                if lod
+                else partial(files.read, given, clip=clip, mesh=mesh, texture=shown_by, **how)
+            )
+            clips: tuple[Clip, ...] = ()
+            if clip == ALL and (names := clip_names(given)):
+                if not (skin and is_glb(target)) or (first, last) != (0, None) or mesh is not None:
+                    raise click.UsageError(
+                        "--clip all is for --skin, a .glb and whole clips: without --start, --stop, --frames, --mesh"
+                    )
+                some, clips = read_clips(names, lambda name, rate: files.read(given, rate, name), fps)
+                start, stop = 0, len(some)
+            elif frames is not None:
+                some = read(fps=fps, frames=(first, last))
+                start, stop = first, first + len(some)
+            else:
+                whole = read(fps=fps)
+                start, stop = files.frame_range(whole, first, last)
+                some = whole.part(start, stop)
+            sequence = chosen(some, parts, None, "convert", progress)
+            found, said = find_skin(sequence, path, wanted, progress) if skin else (None, [])
+            found = found and replace(found, clips=clips)
+            noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
+            noticed += smaller_without(path, sequence, compress) if found and not found.clips else []
+    except TopologyChange:
+        if skin or lod or clip == ALL:
+            raise
+        from gvpipe.cli.audio_options import NO_SOUND
+
+        with source_path(source) as given, target_path(target, ".npz") as path, out.progress() as progress:
+            capture = files.read_capture(given, clip=clip, mesh=mesh, **how).part(first, last)
+            asked = {"parts": parts, "compress": compress, "fps": fps}
+            write_shots(capture, source, target, path, first, asked, progress, out, (None, NO_SOUND))
+        return
     for note in noticed:
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
@@ -184,9 +198,9 @@ def _convert_split(
     out: Output,
 ) -> None:
     """Convert each run of frames of one topology, with a skeleton of its own if one is wanted."""
+    from gvpipe.captures.splitting import is_list, on_one_clock, write_runs
     from gvpipe.cli.choices import chosen
     from gvpipe.cli.skeletons import find_skin
-    from gvpipe.cli.splitting import is_list, on_one_clock, write_runs
     from gvpipe.playback import files
 
     def write(run: Run, path: Path) -> tuple[dict[str, int], list[str]]:

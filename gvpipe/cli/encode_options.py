@@ -18,7 +18,8 @@ Command = Callable[..., None]
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 OPTIONS = (
     click.option(
-        "--codec", help="See `gvpipe codecs`; auto: the one with the smallest file. [default: mcgv; with --for, auto]"
+        "--codec",
+        help="See `gvpipe codecs`; auto: the one with the smallest file. [default: mcgv, of captures pca; with --for, auto]",
     ),
     click.option(
         "--for",
@@ -86,13 +87,13 @@ class Encoding:
     """What the options ask for.
 
     Args:
-        codec: settings, or those of all codecs to choose from.
+        codec: settings, or those of all codecs to choose from; None: the default, whose settings are in ``making``.
         reading: keywords of `gvpipe.playback.files.read`, but for ``unlimited``.
         making: keywords of `gvpipe.api.encode` for what is made of it.
         unlimited: as for `gvpipe.playback.files.read`.
     """
 
-    codec: Codec | list[Codec]
+    codec: Codec | list[Codec] | None
     reading: dict[str, Any]
     making: dict[str, Any]
     unlimited: bool
@@ -118,6 +119,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
         SettingError: no such codec or setting, or a value out of its range.
     """
     from gvpipe.cli.choices import parse_bytes, parse_frames
+    from gvpipe.coding.codec import Codec
     from gvpipe.coding.registry import codec_class
     from gvpipe.rate_control.purposes import candidates
 
@@ -125,7 +127,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
     if sum(value is not None for value in targets.values()) > 1:
         raise click.UsageError("give one of --target-rmse, --target-kg, --target-bpvf and --max-error")
     settings = parse_settings(options)
-    codec = candidates(
+    codec: Codec | list[Codec] | None = candidates(
         options["codec"],
         options["purpose"],
         lambda name, own: codec_class(name).from_texts({**{key: str(value) for key, value in own.items()}, **settings}),
@@ -134,9 +136,11 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
     reading = {name: options[name] for name in ("fps", "clip", "mesh", "real_time", "warp", "volume")} | {
         "frames": parse_frames(options["frames"])
     }
-    making = {**targets, "textures": options["textures"]}
+    making = {}
+    if isinstance(codec, Codec) and options["codec"] is None:  # which one is the default depends on the input
+        codec, making = None, {name: getattr(codec, name) for name in settings}
+    making |= {**targets, "textures": options["textures"], "stream": options["stream"], "bare": options["bare"]}
     making |= {name: options[name] for name in ("texture_quality", "texture_codec")}
-    making |= {"stream": options["stream"], "bare": options["bare"]}
     making["memory"] = None if options["memory"] is None else parse_bytes("--memory", options["memory"])
     making["attributes"] = _parse_bounds("--attribute", options["attributes"])
     making["fields"] = _parse_bounds("--field", options["fields"])

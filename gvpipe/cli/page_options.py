@@ -23,6 +23,11 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.option("--log", is_flag=True, help="Let colours follow the field's logarithm; what is not above 0 is grey."),
     click.option("--speed", type=float, default=1.0, show_default=True, help="0.0625 to 16; 1 is the video's own."),
     warp_option,
+    click.option(
+        "--clip",
+        metavar="PLANE",
+        help="Cut by a plane: x=0.3, y=30% (of the box), or -x=0.3 (what lies below is left out).",
+    ),
     click.option("--camera", metavar="VIEW", help="front, back, left, right, top, bottom, three-quarter or AZIMUTH,ELEVATION."),
     click.option("--shading", type=click.Choice(["smooth", "flat"]), default="smooth", show_default=True),
 )

@@ -48,7 +48,7 @@ MAX_FRAMES = 1 << 24
 MAX_VERTICES = 1 << 28
 
 
-PLAIN, STREAM, BARE, LIVE = "plain", "stream", "bare", "live"  # layouts of files
+PLAIN, STREAM, BARE, LIVE, SHOTS = "plain", "stream", "bare", "live", "shots"  # layouts of files
 NO_ORIGIN = (0.0, 0.0, 0.0)
 MAX_ORIGIN = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]  # of its coordinates' magnitudes: float32's largest number
 

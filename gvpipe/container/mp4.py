@@ -13,11 +13,12 @@ from another file is noticed::
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import os
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -41,8 +42,9 @@ from gvpipe.container.live_layout import read_live
 from gvpipe.container.sample_tables import check_tables
 from gvpipe.container.segments import SegmentParts
 from gvpipe.container.shared_sections import FindSection
+from gvpipe.container.shot_layout import ShotIndex, read_shots
 from gvpipe.container.sources import DOWNLOAD_FIRST, BytesSource, FileSource, Source, check_source, is_remote, is_url
-from gvpipe.container.stream_layout import ROOM_UUID, find_index, pack_stream, read_stream
+from gvpipe.container.stream_layout import ROOM_UUID, SHOTS_UUID, find_index, pack_stream, read_stream
 from gvpipe.container.track import TAG_PREFIX, Track, inspect, remux, remux_fragments
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.budget import Budget
@@ -51,6 +53,7 @@ from gvpipe.foundation.errors import (
     FormatError,
     InputError,
     NotGeometryVideo,
+    SeveralShots,
     StrippedFile,
     TruncatedFile,
     corrupt,
@@ -115,18 +118,55 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False, find: FindS
 
     Raises:
         InputError: there is no such file, or it cannot be read.
-        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, MissingSection, OverBudget: see
-            `gvpipe.foundation.errors`.
+        NotGeometryVideo, NewerVersion, StrippedFile, TruncatedFile, CorruptFile, MissingSection, OverBudget, SeveralShots:
+            see `gvpipe.foundation.errors`.
     """
     if is_remote(path):
         return _read_address(str(path), unlimited, find)
+    with _reading(path) as source, open(path, "rb") as file:
+        budget, index = Budget(None if unlimited else source.size), find_index(source)
+        return _read(file, source.size, budget, find) if index is None else _read_parts(source, index, budget)
+
+
+def read_index(path: str | os.PathLike[str], unlimited: bool = False) -> ShotIndex | None:
+    """The index of a capture's file, None of a file of one shot.
+
+    Args:
+        path: of the file, or its address.
+        unlimited: as of `read_file`.
+
+    Raises:
+        InputError, NewerVersion, TruncatedFile, CorruptFile, OverBudget: as `read_file`.
+    """
+    if is_remote(path):
+        budget = Budget(None if unlimited else 0)
+        with _within(str(path)):
+            return _shots_of(_source_at(str(path), budget), budget)
+    with _reading(path) as source:
+        return _shots_of(source, Budget(None if unlimited else source.size))
+
+
+def _shots_of(source: Source, budget: Budget) -> ShotIndex | None:
+    box = find_index(source)
+    return read_shots(source, box, budget) if box is not None and box.uuid == SHOTS_UUID.bytes else None
+
+
+@contextlib.contextmanager
+def _within(name: str) -> Iterator[None]:
+    """Errors name the file."""
+    try:
+        yield
+    except FormatError as exc:
+        raise exc.within(name) from exc
+
+
+@contextlib.contextmanager
+def _reading(path: str | os.PathLike[str]) -> Iterator[FileSource]:
+    """A file on disk; what cannot be read is one clear error that names it."""
     check_source(path)
     path = Path(path)
     try:
-        source = FileSource(path)
-        with open(path, "rb") as file:
-            budget, index = Budget(None if unlimited else source.size), find_index(source)
-            return _read(file, source.size, budget, find) if index is None else _read_parts(source, index, budget)
+        yield FileSource(path)
     except FormatError as exc:
         raise exc.within(str(path)) from exc
     except IsADirectoryError as exc:
@@ -139,12 +179,16 @@ def read_file(path: str | os.PathLike[str], unlimited: bool = False, find: FindS
 
 def read_bytes(data: bytes, name: str, unlimited: bool = False, find: FindSection | None = None) -> Bitstream:
     """As `read_file`, of a file in memory; messages call it ``name``."""
-    try:
-        source = BytesSource(data)
+    return read_source(BytesSource(data), name, unlimited, find)
+
+
+def read_source(source: Source, name: str, unlimited: bool = False, find: FindSection | None = None) -> Bitstream:
+    """As `read_file`, of any bytes, such as a shot of a capture; messages call them ``name``."""
+    with _within(name):
         budget, index = Budget(None if unlimited else source.size), find_index(source)
-        return _read(io.BytesIO(data), source.size, budget, find) if index is None else _read_parts(source, index, budget)
-    except FormatError as exc:
-        raise exc.within(name) from exc
+        if index is not None:
+            return _read_parts(source, index, budget)
+        return _read(io.BytesIO(source.read(0, source.size)), source.size, budget, find)
 
 
 def bytes_by_part(bitstream: Bitstream, size: int) -> dict[str, int]:
@@ -240,7 +284,13 @@ def _source_at(url: str, budget: Budget) -> HttpSource | StoreSource:
 
 
 def _read_parts(source: Source, index: Box, budget: Budget) -> Bitstream:
-    """Read a file in the stream layout, finished or not."""
+    """Read a file in the stream layout, finished or not; raises `SeveralShots` for a capture."""
+    if index.uuid == SHOTS_UUID.bytes:
+        count = len(read_shots(source, index, budget).frames)
+        raise SeveralShots(
+            f"it is a capture of {count} shots, each with vertices and triangles of its own",
+            "open it by gvpipe.open_capture, read a shot by its frames, or make a file of each: gvpipe decode",
+        )
     return (read_live if index.uuid == ROOM_UUID.bytes else read_stream)(source, index, budget)
 
 

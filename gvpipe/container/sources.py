@@ -172,5 +172,28 @@ class BytesSource:
         """Nothing changes: what is in memory stays as it is."""
 
 
+class SourceWindow:
+    """Some bytes of another source, as a file of their own.
+
+    Args:
+        source: the other one.
+        start: of these bytes in it.
+        size: how many they are.
+    """
+
+    def __init__(self, source: Source, start: int, size: int) -> None:
+        self._source, self._start, self.size = source, start, size
+
+    def read(self, offset: int, length: int) -> bytes:
+        """Return bytes ``offset`` to ``offset + length`` of the window; raises `TruncatedFile` if there are fewer."""
+        if offset < 0 or length < 0 or offset + length > self.size:
+            raise TruncatedFile(f"it ends at byte {self.size}, {length} from {offset} on are needed")
+        return self._source.read(self._start + offset, length)
+
+    def let_grow(self) -> None:
+        """Read on though the file around it has become larger."""
+        self._source.let_grow()
+
+
 def _state(found: os.stat_result) -> tuple[int, int, int]:
     return found.st_size, found.st_mtime_ns, found.st_ino

@@ -51,6 +51,7 @@ from gvpipe.foundation.errors import TruncatedFile, corrupt, corrupt_section
 
 INDEX_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f52")
 ROOM_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f53")  # of the index of a file that is not finished (`live_layout`)
+SHOTS_UUID = UUID("3c0a7e35-8f0d-4a86-9b0e-1f5b8f1f6f54")  # of the index of a file of several shots (`shot_layout`)
 DATA_UUID = UUID("b9c6d1a4-52e7-4f3b-8a55-0d6e7c2f9a31")
 PLACE = struct.Struct("<QIQ")
 COUNT = struct.Struct("<I")
@@ -154,7 +155,7 @@ def pack_index(places: Mapping[str, Place], table: np.ndarray, whole: bytes) -> 
 
 
 def find_index(source: Source) -> Box | None:
-    """The box of the index, or room for it, behind one ``ftyp`` and one ``moov``; None for files of the plain layout."""
+    """The box of an index, or room for it, behind one ``ftyp`` and one ``moov``; None for files of the plain layout."""
     at = 0
     for kind in (b"ftyp", b"moov"):
         box = read_box(source.read, at, source.size)
@@ -162,7 +163,7 @@ def find_index(source: Source) -> Box | None:
             return None
         at = box.stop
     head = source.read(at, max(0, min(LONGEST_HEAD, source.size - at)))
-    kinds = (INDEX_UUID.bytes, ROOM_UUID.bytes)
+    kinds = (INDEX_UUID.bytes, ROOM_UUID.bytes, SHOTS_UUID.bytes)
     if head[4:8] != b"uuid" or not any(kind in head for kind in kinds):
         return None
     box = read_box(source.read, at, source.size)

@@ -134,6 +134,10 @@ class CorruptFile(FormatError):
     """A checksum, a length or an index in the file does not hold."""
 
 
+class SeveralShots(FormatError):
+    """The file is a capture, whose vertices and triangles change; `gvpipe.open_capture` reads it."""
+
+
 class MissingSection(FormatError):
     """The file refers to a section that lies in the shard that it was taken out of (`gvpipe.container.shared_sections`)."""
 

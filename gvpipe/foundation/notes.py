@@ -62,6 +62,12 @@ def whole_numbers(names: Sequence[str]) -> tuple[str, ...]:
     return (f"whole numbers alone, so kept exactly: {listed} ({each})",) if names else ()
 
 
+def shots(name: str, n_shots: int, first: int) -> str:
+    """That an input has become a capture."""
+    times = count(n_shots - 1, "time")
+    return f"{name}: vertices or triangles change {times}, first at frame {first}; the file is a capture of {n_shots} shots"
+
+
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:
     """The note for attributes that the file has no place for."""
     return (f"the file does not carry {', '.join(names)}",) if names else ()

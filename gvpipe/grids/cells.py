@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Int64, UInt8
+from gvpipe.grids.polyhedra import Polyhedra, join_polyhedra
 
 # cells by the number of their dimensions; types in neither list are refused
 POINTS_AND_LINES = frozenset((0, 1, 2, 3, 4, 21, 35, 68, 75))
@@ -108,6 +109,7 @@ class Cells:
         types: ``(M,) uint8`` VTK's number of each cell's type.
         offsets: ``(M + 1,) int64`` where each cell's nodes start, and the end.
         nodes: ``(K,) int64`` points of the cells, one cell after the other.
+        polyhedra: faces of the cells of that type, in their order; None: they are not known, or there are none.
 
     Raises:
         ValueError: offsets that do not rise or end elsewhere, a cell with another number of nodes than its type.
@@ -116,8 +118,11 @@ class Cells:
     types: UInt8
     offsets: Int64
     nodes: Int64
+    polyhedra: Polyhedra | None = None
 
     def __post_init__(self) -> None:
+        if self.polyhedra is not None and len(self.polyhedra.counts) != int((self.types == POLYHEDRON).sum()):
+            raise ValueError(f"faces of {len(self.polyhedra.counts)} polyhedra; there are {(self.types == POLYHEDRON).sum()}")
         if len(self.offsets) != len(self.types) + 1 or self.offsets[0] != 0 or self.offsets[-1] != len(self.nodes):
             raise ValueError(
                 f"its {len(self.types)} cells have {len(self.offsets)} offsets up to {int(self.offsets[-1])}, "
@@ -142,7 +147,16 @@ class Cells:
         sizes = self.sizes[rows]
         ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
         within = np.arange(ends[-1]) - np.repeat(ends[:-1], sizes)
-        return Cells(self.types[rows], ends, self.nodes[np.repeat(self.offsets[rows], sizes) + within])
+        polyhedra = self.polyhedra
+        if polyhedra is not None:
+            number = np.cumsum(self.types == POLYHEDRON) - 1
+            polyhedra = polyhedra.select(number[rows[self.types[rows] == POLYHEDRON]])
+        return Cells(self.types[rows], ends, self.nodes[np.repeat(self.offsets[rows], sizes) + within], polyhedra)
+
+    def renumbered(self, number: Int64) -> Cells:
+        """The same with point ``number[p]`` in place of p."""
+        polyhedra = None if self.polyhedra is None else self.polyhedra.renumbered(number)
+        return Cells(self.types, self.offsets, number[self.nodes], polyhedra)
 
     def equals(self, other: Cells) -> bool:
         """Whether both are the same cells in the same order."""
@@ -150,6 +164,8 @@ class Cells:
             np.array_equal(self.types, other.types)
             and np.array_equal(self.offsets, other.offsets)
             and np.array_equal(self.nodes, other.nodes)
+            and (self.polyhedra is None) == (other.polyhedra is None)
+            and (self.polyhedra is None or other.polyhedra is None or self.polyhedra.equals(other.polyhedra))
         )
 
 
@@ -174,7 +190,17 @@ def join_cells(pieces: list[Cells], starts: list[int]) -> Cells:
         np.concatenate([piece.types for piece in pieces]),
         np.concatenate([*offsets, ends[-1:]]).astype(np.int64),
         np.concatenate([piece.nodes + start for piece, start in zip(pieces, starts, strict=True)]),
+        _joined_polyhedra(pieces, starts),
     )
+
+
+def _joined_polyhedra(pieces: list[Cells], starts: list[int]) -> Polyhedra | None:
+    known = [
+        Polyhedra(own.counts, own.sizes, own.nodes + start)
+        for piece, start in zip(pieces, starts, strict=True)
+        if (own := piece.polyhedra) is not None
+    ]
+    return join_polyhedra(known) if known else None
 
 
 def structured_cells(dimensions: tuple[int, int, int]) -> Cells:

@@ -6,7 +6,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 
-COUNT = re.compile(r" \(\d+\)$")  # of things that were met several times
+COUNT = re.compile(r" \((\d+)\)$")  # of things that were met several times
+VOLUME_CELLS, INNER_POINTS = "volume cells", "inner points"
 
 
 class LeftBehind:
@@ -45,3 +46,17 @@ def met_later(first: Iterable[str], later: Iterable[str]) -> list[str]:
     """Names of a later file that the first one has not, however often either met them."""
     known = {COUNT.sub("", name) for name in first}
     return [name for name in later if COUNT.sub("", name) not in known]
+
+
+def count_of(names: Iterable[str], name: str) -> int:
+    """How often something was met, by `LeftBehind.names`.
+
+    Examples:
+        >>> count_of(("cameras", "volume cells (12)"), "volume cells"), count_of(("cameras",), "cameras")
+        (12, 1)
+    """
+    for each in names:
+        if COUNT.sub("", each) == name:
+            found = COUNT.search(each)
+            return int(found[1]) if found else 1
+    return 0

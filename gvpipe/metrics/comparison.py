@@ -2,7 +2,7 @@
 
 `compare` walks both sequences once, a block of frames at a time, so that neither needs to fit in memory. Formulas,
 units, sources and limits of every number are in ``docs/metrics.md``; STED is in `gvpipe.metrics.sted`, the surface distance
-in `gvpipe.metrics.hausdorff`.
+in `gvpipe.metrics.hausdorff`. Where vertices do not correspond, surfaces are compared (`gvpipe.metrics.surface_comparison`).
 
 Sources: Z. Karni and C. Gotsman, Compression of soft-body animation sequences, 2004 (``kg``); M. Sattler, R. Sarlette
 and R. Klein, Simple and efficient compression of animation sequences, 2005 (``da``).
@@ -10,8 +10,12 @@ and R. Klein, Simple and efficient compression of animation sequences, 2005 (``d
 
 from __future__ import annotations
 
+import math
+import os
+import weakref
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +24,12 @@ from gvpipe.foundation.arrays import Integers
 from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.topology import unique_edges
 from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare_fields, compare_volumes
-from gvpipe.metrics.correspondence import canonical_triangles, match_vertices
 from gvpipe.metrics.hausdorff import Hausdorff
+from gvpipe.metrics.pairing import Unpaired, pair_vertices
 from gvpipe.metrics.sted import Sted
+from gvpipe.metrics.surface_comparison import CaptureSurfaces, SequenceSurfaces, SurfaceComparison, compare_surfaces
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 FramesDone = Callable[[int, int], None]
@@ -38,6 +44,10 @@ class Comparison:
     bounding-box diagonal: ``rmse_diag``, ``max_diag``. Percent: ``kg`` and ``da``. Without unit: the ``sted`` values.
     ``attributes`` and ``fields`` have the largest and mean error of each, in its own unit, degrees for normals and tangents;
     ``volume`` has those of what lies inside of the surface.
+
+    ``surface`` has the distances of surfaces, where they were asked for or vertices do not correspond. ``unpaired`` says why
+    vertices do not, else it is empty. If they do not, ``rmse`` and ``max`` are NaN, other numbers of vertices ``None``,
+    ``frames`` is empty, and attributes, fields and volumes are not compared.
     """
 
     rmse: float
@@ -54,23 +64,64 @@ class Comparison:
     attributes: AssetErrors = field(default_factory=dict)
     fields: AssetErrors = field(default_factory=dict)
     volume: AssetErrors = field(default_factory=dict)
+    surface: SurfaceComparison | None = None
+    unpaired: str = ""
 
     def to_json(self) -> dict[str, object]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
-        return asdict(self)
+        values = asdict(self)
+        return values | {name: None for name in ("rmse", "max") if math.isnan(values[name])}
+
+    def of(self, reference: object, distorted: object) -> Comparison:
+        """The same, which notebooks show with players of both sides: paths, or objects, as long as others hold them."""
+        object.__setattr__(self, "_sides", [_held(each) for each in (reference, distorted)])
+        return self
+
+    @property
+    def sides(self) -> list[Any]:
+        """What was compared, reference first; [] if it is gone, or was never told."""
+        sides = [side() if isinstance(side, weakref.ref) else side for side in self.__dict__.get("_sides", ())]
+        return [] if any(side is None for side in sides) else sides
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_sides"}
+
+    def _repr_html_(self) -> str:
+        from gvpipe.metrics.comparison_page import comparison_html
+
+        return comparison_html(self.to_json())
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
 
 
-def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDone | None = None) -> Comparison:
-    """Measure ``distorted`` against ``reference``, vertex by vertex, frame by frame.
+def _held(given: object) -> Any:
+    return given if isinstance(given, str | os.PathLike | list | tuple) else weakref.ref(given)
+
+
+NOTHING = Comparison(math.nan, None, math.nan, None, None, None, None, None, None, None, [])
+
+
+def compare(
+    reference: MeshSequence,
+    distorted: MeshSequence,
+    progress: FramesDone | None = None,
+    *,
+    surface: bool | None = None,
+) -> Comparison:
+    """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
     Args:
         reference: the original; lengths are divided by its size.
-        distorted: as many frames and vertices, the same triangles in any order.
+        distorted: as many frames; of the same vertices and triangles, in any order, or of others.
         progress: called with (frames done, frames in all) after each block.
+        surface: True: surfaces too; False: never; None: where vertices do not correspond.
 
     Raises:
-        InputError: the two differ in their number of frames or vertices or in their triangles, so that vertices do not
-            correspond.
+        InputError: they differ in their number of frames, vertices do not correspond and ``surface`` is False, or surfaces are
+            needed and one side has no triangles.
         TypeError: one of them is no sequence.
 
     Examples:
@@ -85,7 +136,45 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
     for role, given in (("reference", reference), ("distorted", distorted)):
         if not isinstance(given, MeshSequence):
             raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence is needed, such as gvpipe.read(path)")
-    given, pairing = distorted, pair_vertices(reference, distorted)
+    has_surfaces = bool(len(reference.faces) and len(distorted.faces))
+    try:
+        pairing = pair_vertices(reference, distorted)
+    except Unpaired as exc:
+        if surface is False or not has_surfaces:
+            raise
+        return replace(NOTHING, surface=_surfaces(reference, distorted, progress), unpaired=str(exc))
+    if not surface:
+        return _compare_vertices(reference, distorted, pairing, progress)
+    if not has_surfaces:
+        raise InputError(f"{reference.name} has no triangles, so that there are no surfaces to compare; compare vertices alone")
+    errors = _compare_vertices(reference, distorted, pairing, _half(progress, 0))
+    return replace(errors, surface=_surfaces(reference, distorted, _half(progress, 1)))
+
+
+def compare_captures(reference: Capture, distorted: Capture, progress: FramesDone | None = None) -> Comparison:
+    """Measure two animations whose vertices or triangles change, by their surfaces.
+
+    Raises:
+        InputError: they differ in their number of frames, or one side of a frame has no triangles.
+    """
+    surface = compare_surfaces(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress)
+    changing = reference if len(reference.shots) > 1 else distorted
+    return replace(NOTHING, surface=surface, unpaired=f"vertices or triangles of {changing.name} change")
+
+
+def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
+    """Progress of the first (0) or second (1) walk through all frames."""
+    return None if progress is None else lambda done, of: progress(done + half * of, 2 * of)
+
+
+def _surfaces(reference: MeshSequence, distorted: MeshSequence, progress: FramesDone | None) -> SurfaceComparison:
+    return compare_surfaces(SequenceSurfaces(reference), SequenceSurfaces(distorted), progress)
+
+
+def _compare_vertices(
+    reference: MeshSequence, distorted: MeshSequence, pairing: Integers | None, progress: FramesDone | None
+) -> Comparison:
+    given = distorted
     distorted = distorted if pairing is None else distorted.reordered(np.argsort(pairing), reference.faces)
     n_frames = reference.n_frames
     edges = unique_edges(reference.faces)
@@ -120,38 +209,3 @@ def compare(reference: MeshSequence, distorted: MeshSequence, progress: FramesDo
         fields=compare_fields(reference, given, same),
         volume=compare_volumes(reference, given),
     )
-
-
-def aligned(reference: MeshSequence, distorted: MeshSequence) -> MeshSequence:
-    """Return ``distorted`` in the reference's vertex order; raises `InputError` as `pair_vertices`."""
-    pairing = pair_vertices(reference, distorted)
-    return distorted if pairing is None else distorted.reordered(np.argsort(pairing), reference.faces)
-
-
-def pair_vertices(reference: MeshSequence, distorted: MeshSequence) -> Integers | None:
-    """Return ``(V,)`` the reference's vertex of each vertex of ``distorted``; None if they are in the same order.
-
-    Raises:
-        InputError: the two do not belong together.
-    """
-    counts = (
-        ("frames", reference.n_frames, distorted.n_frames),
-        ("vertices", reference.n_vertices, distorted.n_vertices),
-        ("triangles", len(reference.faces), len(distorted.faces)),
-    )
-    for what, ours, theirs in counts:
-        if ours != theirs:
-            raise InputError(
-                f"{reference.name} has {ours} {what}, {distorted.name} has {theirs}; equal numbers are needed, since "
-                "vertices are compared by index"
-            )
-    if np.array_equal(canonical_triangles(reference.faces), canonical_triangles(distorted.faces)):
-        return None
-    pairing = match_vertices(reference, distorted)
-    if pairing is None:
-        raise InputError(
-            f"{reference.name} and {distorted.name} both have {reference.n_vertices} vertices and "
-            f"{len(reference.faces)} triangles, but not the same triangles, in whatever vertex order; compare a sequence with "
-            "what was made from it"
-        )
-    return pairing

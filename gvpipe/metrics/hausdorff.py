@@ -83,7 +83,7 @@ class Hausdorff:
         while start < len(order) and bound[order[start]] > self._best:
             batch = order[start : start + size]
             batch = batch[bound[batch] > self._best]
-            self._best = max(self._best, float(target.distances(points[batch], bound[batch], self._best).max()))
+            self._best = max(self._best, float(target.distances(points[batch], bound[batch]).max()))
             start, size = start + size, min(4 * size, MAX_BATCH)
 
 

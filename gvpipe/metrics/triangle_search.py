@@ -6,25 +6,19 @@ foot is inside" and "nearest of three segments". That needs no branches and hold
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gvpipe.foundation.arrays import Float64, Int32, Integers
+from gvpipe.metrics.triangle_tree import TriangleTree, build_tree, find_nearest
 
 MAX_PAIRS = 200_000  # (point, triangle) pairs measured at a time: about 50 MB of temporaries
-NEAREST = 8  # triangles by centroid that give a first bound in the full search
-ROUNDING = 1e-12  # relative slack of a search radius, so that no triangle is lost to float64 rounding
-RADIUS_STEP = 2.0  # triangles are searched in groups whose radii differ by at most this factor
 
 Index = NDArray[np.intp]
 
 
 class TriangleSearch:
-    """One frame's triangles, searched by centroid; the trees are built when first needed.
+    """One frame's triangles; the tree is built when it is first needed.
 
     Args:
         positions: ``(V, 3)``, model units.
@@ -33,8 +27,7 @@ class TriangleSearch:
 
     def __init__(self, positions: Float64, faces: Int32) -> None:
         self.positions, self._faces = positions, faces
-        self._tree: cKDTree | None = None
-        self._groups: list[tuple[float, Index, cKDTree]] = []
+        self._tree: TriangleTree | None = None
 
     def nearest_of(self, points: Float64, triangles: Index, counts: Integers) -> Float64:
         """Distance ``(P,)`` of each point ``(P, 3)`` to the nearest of its own triangles, ``counts (P,)`` > 0 of the given."""
@@ -45,36 +38,11 @@ class TriangleSearch:
             squared[pairs] = squared_distances(points[owner[pairs]], self.positions[self._faces[triangles[pairs]]])
         return np.sqrt(np.minimum.reduceat(squared, np.cumsum(counts) - counts))
 
-    def distances(self, points: Float64, bound: Float64, ignore: float) -> Float64:
-        """Distance ``(P,)`` of points at most ``bound (P,)`` away: exact, or an upper bound of at most ``ignore``."""
+    def distances(self, points: Float64, bound: Float64) -> Float64:
+        """Distance ``(P,)`` of points ``(P, 3)`` at most ``bound (P,)`` away."""
         if self._tree is None:
-            self._tree, self._groups = self._build()
-        k = min(NEAREST, len(self._faces))
-        nearest = np.asarray(self._tree.query(points, k)[1], dtype=np.intp).reshape(-1)
-        result = np.minimum(bound, self.nearest_of(points, nearest, np.full(len(points), k)))
-        for radius, members, tree in self._groups:
-            left = np.flatnonzero(result > ignore)
-            reach = (result + radius) * (1 + ROUNDING)  # a nearer triangle's centroid lies within
-            counts = np.asarray(tree.query_ball_point(points[left], reach[left], return_length=True))
-            left, counts = left[counts > 0], counts[counts > 0]
-            for batch in _batches(counts, MAX_PAIRS):
-                rows = left[batch]
-                found = tree.query_ball_point(points[rows], reach[rows])
-                candidates = members[np.concatenate(found).astype(np.intp)]
-                result[rows] = np.minimum(result[rows], self.nearest_of(points[rows], candidates, counts[batch]))
-        return result
-
-    def _build(self) -> tuple[cKDTree, list[tuple[float, Index, cKDTree]]]:
-        corners = self.positions[self._faces]  # (T, 3 corners, 3)
-        centroids = corners.mean(axis=1)
-        radii = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
-        smallest = max(float(radii.max()) * 2.0**-20, np.finfo(np.float64).tiny)
-        level = np.floor(np.log(np.maximum(radii, smallest)) / np.log(RADIUS_STEP))
-        groups = []
-        for value in np.unique(level):
-            members = np.flatnonzero(level == value)
-            groups.append((float(radii[members].max()), members, _tree(centroids[members])))
-        return _tree(centroids), groups
+            self._tree = build_tree(self.positions[self._faces])
+        return find_nearest(self._tree, points, bound).distances
 
 
 def squared_distances(points: Float64, triangles: Float64) -> Float64:
@@ -98,18 +66,6 @@ def squared_distances(points: Float64, triangles: Float64) -> Float64:
     plane = np.divide(height * height, area, out=np.full(len(points), np.inf), where=inside)
     smaller: Float64 = np.minimum(nearest, plane)
     return smaller
-
-
-def _tree(centroids: Float64) -> cKDTree:
-    return cKDTree(centroids, balanced_tree=False, compact_nodes=False)  # a third of the time to build
-
-
-def _batches(counts: Integers, limit: int) -> Iterator[slice]:
-    """Slices of consecutive items whose counts sum to about ``limit`` at most (one item may exceed it)."""
-    cuts = np.flatnonzero(np.diff(np.cumsum(counts) // limit)) + 1
-    for start, stop in pairwise([0, *cuts.tolist(), len(counts)]):
-        if stop > start:
-            yield slice(start, stop)
 
 
 def _dot(a: Float64, b: Float64) -> Float64:

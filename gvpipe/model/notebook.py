@@ -1,4 +1,4 @@
-"""What notebooks show of a sequence or a geometry video: its first frame and its numbers, as a piece of HTML.
+"""What notebooks show of a sequence or a geometry video: an interactive player, or its first frame and its numbers as HTML.
 
 The picture is inline PNG, so that a saved notebook needs no other file.
 """
@@ -9,7 +9,8 @@ import base64
 import html
 import io
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from gvpipe.foundation.errors import GvpipeError
 from gvpipe.foundation.text import escaped
@@ -19,6 +20,14 @@ if TYPE_CHECKING:
 
 SIZE = 240  # pixels, of both sides
 SAMPLES = 3  # per pixel and axis
+INTERACTIVE = "gvpipe.notebook.display"  # floors above this module, so it is known by its name, as codecs are
+
+
+def mimebundle(shown: Any) -> dict[str, Any]:
+    """What a notebook shows of the last line of a cell, by media type: a player, where there can be one, or ``_repr_html_``."""
+    still: str = shown._repr_html_()
+    shows: dict[str, Any] | None = import_module(INTERACTIVE).interactive(shown, still)
+    return shows or {"text/html": still, "text/plain": repr(shown)}
 
 
 def card(title: str, numbers: Mapping[str, str], sequence: Animation) -> str:

@@ -242,6 +242,11 @@ class MeshSequence:
 
         return card(self.name, numbers_of(self), self)
 
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
+
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.
 

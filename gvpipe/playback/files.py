@@ -8,14 +8,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from gvpipe.container.sources import VIDEO_SUFFIXES, is_remote
 from gvpipe.foundation.arguments import StrPath, check_path, show
-from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.errors import InputError, SeveralShots, TopologyChange
 
 if TYPE_CHECKING:
     from gvpipe.io.runs import Run
+    from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.model.skin import Skin
     from gvpipe.playback.player import Player
@@ -33,7 +34,7 @@ def read(
     unlimited: bool = False,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = False,
     texture: StrPath | None = None,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
@@ -50,6 +51,7 @@ def read(
             become a film of 25 frames a second. The times are kept either way.
         warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
         volume: whether what lies inside of a simulation's surface is read, too: volume cells, inner points, and their numbers.
+            None: where there is something.
         texture: a picture for each frame, in place of the texture of the base colour: a folder, a glob or a pattern of
             pictures, or a video.
 
@@ -58,7 +60,9 @@ def read(
         SettingError: ``warp`` is of another form.
         TypeError: it is no path.
     """
-    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, volume)
+    sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, bool(volume))
+    if volume is None and has_inside(sequence):
+        sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, True)
     if texture is not None:
         sequence = add_texture(sequence, texture, frames)
     if warp is None:
@@ -83,8 +87,35 @@ def add_texture(sequence: MeshSequence, texture: StrPath, frames: tuple[int, int
     from gvpipe.model.moving_texture import with_pictures
 
     pictures = open_pictures(check_path(texture, "the texture"), len(sequence), frames)
-    name = Path(os.fspath(texture)).stem.rstrip("_-. %0d#*") or "texture"
-    return with_pictures(sequence, pictures, name)
+    return with_pictures(sequence, pictures, _texture_name(texture))
+
+
+def add_texture_to_shots(capture: Capture, texture: StrPath, frames: tuple[int, int | None] | None = None) -> Capture:
+    """Return a capture whose shots have the pictures of their frames; the rest is as of `add_texture`."""
+    from gvpipe.asset.moving import SomePictures
+    from gvpipe.io.picture_rows import open_pictures
+    from gvpipe.model.capture import Capture
+    from gvpipe.model.moving_texture import with_pictures
+
+    pictures = open_pictures(check_path(texture, "the texture"), len(capture), frames)
+    name, starts = _texture_name(texture), capture.starts
+    shots = [
+        with_pictures(shot, SomePictures(pictures, start, start + len(shot)), name)
+        for shot, start in zip(capture.shots, starts, strict=True)
+    ]
+    return Capture(shots, capture.name, sound=capture.sound)
+
+
+def _texture_name(texture: StrPath) -> str:
+    """What an image is called: the name of its files without numbers."""
+    return Path(os.fspath(texture)).stem.rstrip("_-. %0d#*") or "texture"
+
+
+def has_inside(sequence: MeshSequence) -> bool:
+    """Whether its source has volume cells, which were not read."""
+    from gvpipe.io.left_behind import VOLUME_CELLS, count_of
+
+    return count_of(sequence.not_carried, VOLUME_CELLS) > 0
 
 
 def _read(
@@ -106,18 +137,73 @@ def _read(
             return read_sequence(path, fps, clip, mesh, frames, unlimited, real_time, volume)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
-    if Path(one).suffix.lower() not in VIDEO_SUFFIXES and not is_remote(one):
+    if not is_video(one):
         return read_sequence(one, fps, clip, mesh, frames, unlimited, real_time, volume)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     if mesh is not None:
         raise InputError(f"{one} has triangles of its own; mesh={os.fspath(mesh)!r} is for point caches")
+    sequence = read_video(one, frames, unlimited=unlimited)
+    return sequence if fps is None else sequence.with_fps(fps)
+
+
+def read_video(path: StrPath, frames: tuple[int, int | None] | None = None, *, unlimited: bool = False) -> MeshSequence:
+    """A geometry video, or some frames of it, as a sequence that decodes what is read.
+
+    Raises:
+        TopologyChange: it is a capture, and the frames lie in several of its shots.
+        InputError, FormatError: as `read`.
+    """
     from gvpipe.playback.player import Player
 
-    sequence = Player(one, unlimited=unlimited).sequence()
-    if frames is not None:
-        sequence = sequence.part(*frame_range(sequence, *frames))
-    return sequence if fps is None else sequence.with_fps(fps)
+    try:
+        sequence = Player(path, unlimited=unlimited).sequence()
+    except SeveralShots:
+        capture = read_capture(path, frames=frames, unlimited=unlimited)
+        if len(capture.shots) == 1:
+            return capture.shots[0]
+        start = 0 if frames is None else frames[0]
+        what = f"{path}: vertices or triangles change at frame {start + capture.starts[1]}"
+        raise TopologyChange.at(what, start + capture.starts[1], start) from None
+    return sequence if frames is None else sequence.part(*frame_range(sequence, *frames))
+
+
+def read_capture(
+    path: Source,
+    fps: float | None = None,
+    clip: str | None = None,
+    mesh: StrPath | None = None,
+    frames: tuple[int, int | None] | None = None,
+    *,
+    unlimited: bool = False,
+    real_time: bool = False,
+    warp: str | None = None,
+    volume: bool = False,
+) -> Capture:
+    """Read an input whose vertices or triangles may change: a row of shots, each with a connectivity of its own.
+
+    The arguments are those of `read`. An input that keeps its connectivity is a capture of one shot.
+
+    Raises:
+        InputError, FormatError: the path or what it holds cannot be used.
+    """
+    from gvpipe.model.capture import Capture
+
+    if is_video(path) and clip is None and mesh is None and warp is None:
+        from gvpipe.playback.capture_player import CapturePlayer
+
+        given = CapturePlayer(path, unlimited=unlimited).capture()
+        given = given if frames is None else given.part(*frames)
+        return given if fps is None else given.with_fps(fps)
+    how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
+    runs = read_runs(path, fps, clip, mesh, frames, **how)
+    name = path if isinstance(path, str | os.PathLike) else path[0]
+    return Capture([run.sequence for run in runs], os.fspath(name))
+
+
+def is_video(path: Source) -> TypeGuard[StrPath]:
+    """Whether an input is one geometry video, by its name."""
+    return isinstance(path, str | os.PathLike) and (Path(path).suffix.lower() in VIDEO_SUFFIXES or is_remote(path))
 
 
 def read_runs(
@@ -130,7 +216,7 @@ def read_runs(
     unlimited: bool = False,
     real_time: bool = False,
     warp: str | None = None,
-    volume: bool = False,
+    volume: bool | None = False,
 ) -> list[Run]:
     """Read an input whose vertices or triangles may change, as one sequence for each run of frames where they do not.
 
@@ -139,8 +225,13 @@ def read_runs(
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
     """
-    from gvpipe.io.runs import find_runs
+    from gvpipe.io.runs import Run, find_runs
 
+    if is_video(path) and clip is None and mesh is None and warp is None:
+        capture = read_capture(path, fps, frames=frames, unlimited=unlimited)
+        begin = 0 if frames is None else frames[0]
+        spans = zip(capture.starts, capture.lengths, capture.shots, strict=True)
+        return [Run(begin + start, begin + start + length, shot) for start, length, shot in spans]
     return find_runs(
         lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited, real_time=real_time, warp=warp, volume=volume),
         frames,

@@ -141,7 +141,7 @@ class LiveEncoder:
             )
         if positions.dtype.kind not in "fiu":
             raise InputError(f"frame {self.n_frames} has type {positions.dtype}; numbers are needed")
-        frame = narrow(positions[None], self._first.origin)
+        frame = narrow(np.array(positions[None]), self._first.origin)  # a copy: loops write each frame into one array
         check_finite(frame, FRAMES, self.n_frames)
         result: Float32 = frame[0]
         return result

@@ -23,10 +23,10 @@ from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.coding.codec import GroupReader, LevelReader
 from gvpipe.coding.registry import codec_class, codec_ids, open_reader, read_skin
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import read_bytes, read_file
+from gvpipe.container.mp4 import read_file, read_source
 from gvpipe.container.outline import Outline
 from gvpipe.container.shared_sections import FindSection
-from gvpipe.container.sources import is_remote
+from gvpipe.container.sources import BytesSource, Source, is_remote
 from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
@@ -52,7 +52,8 @@ class Player:
         path: of the file, or its address (``https://...``): of a file in the stream layout, what is asked for is fetched.
         unlimited: let it take whatever memory and work it asks for; by default its size limits both
             (`gvpipe.foundation.budget`).
-        data: the file's bytes, of a file in memory; ``path`` is its name in messages then.
+        data: the file's bytes, or what gives them (`gvpipe.container.sources.Source`), of a file that is no file on disk;
+            ``path`` is its name in messages then.
         shared: of a sample that was taken out of a shard: what has the sections that the shard's files share, such as
             `gvpipe.datasets.SharedSections`.
 
@@ -67,7 +68,7 @@ class Player:
         path: str | os.PathLike[str],
         *,
         unlimited: bool = False,
-        data: bytes | None = None,
+        data: bytes | Source | None = None,
         shared: FindSection | None = None,
     ) -> None:
         check_path(path, "the geometry video")
@@ -75,7 +76,8 @@ class Player:
         # another process may have another working directory
         self._absolute = self.path if data is not None or is_remote(self.path) else os.path.abspath(self.path)
         self._unlimited, self._data, self._find = unlimited, data, shared
-        read = partial(read_file, path) if data is None else partial(read_bytes, data, self.path)
+        given = BytesSource(data) if isinstance(data, bytes) else data
+        read = partial(read_file, path) if given is None else partial(read_source, given, self.path)
         self.bitstream: Bitstream = read(unlimited, shared)
         with in_file(self.path):
             self._reader = open_reader(self.bitstream)
@@ -86,6 +88,11 @@ class Player:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(type(self), unlimited=self._unlimited, data=self._data, shared=self._find), (self._absolute,)
+
+    @property
+    def on_disk(self) -> str | None:
+        """Absolute path of the file; None for one in memory, or at an address."""
+        return None if self._data is not None or is_remote(self.path) else self._absolute
 
     @property
     def faces(self) -> Int32:
@@ -140,7 +147,7 @@ class Player:
     @property
     def sound(self) -> Sound | None:
         """What is heard with the frames, None if the file has none; its samples are read when they are asked for."""
-        return read_sound(self.bitstream)[0]
+        return read_sound(self.bitstream.companions)[0]
 
     @property
     def times(self) -> Float64:
@@ -281,6 +288,11 @@ class Player:
         numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
         numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
         return card(self.path, numbers, sequence)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
 
     def __enter__(self) -> Player:
         return self

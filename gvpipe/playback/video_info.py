@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 from typing import Any
 
 from gvpipe.asset_coding.directory import read_directory
 from gvpipe.asset_coding.listing import list_asset
+from gvpipe.container.bitstream import SHOTS, Bitstream
 from gvpipe.container.mp4 import bytes_by_part, read_file
 from gvpipe.container.outline import Outline
 from gvpipe.foundation.arguments import StrPath, check_path
-from gvpipe.foundation.errors import in_file
+from gvpipe.foundation.errors import SeveralShots, in_file
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,8 @@ class Info:
         sections: bytes of every part of the file, which add up to ``bytes``.
         levels: vertex counts of the levels of detail, the mesh itself first.
         settings: the bitstream's header.
-        layout: ``plain``, ``stream`` (`restream`), or ``live``: still written, or left unfinished (`gvpipe.playback.live`).
+        layout: ``plain``, ``stream`` (`restream`), ``bare``, ``live``: still written, or left unfinished
+            (`gvpipe.playback.live`), or ``shots``: a capture.
         origin: to add to positions, model units.
         parts: name, ranges of vertices and triangles, name of the material, parent.
         attributes: name, kind, domain, components, type, unit, bound (degrees for normals) and bytes of each.
@@ -42,6 +45,8 @@ class Info:
         audio: codec, channels, rate, seconds, start (seconds after frame 0) and bytes of the sound; or None.
         not_carried: what the source had beside what the file carries.
         notes: what a user should know, a line each.
+        shots: of a capture: ``start``, ``frames``, ``vertices``, ``triangles``, ``codec`` and ``bytes`` of each. Then
+            ``vertices`` and ``triangles`` are those of the largest, ``sections`` the sums, and the rest is that of the first.
     """
 
     codec: str
@@ -69,6 +74,7 @@ class Info:
     audio: dict[str, Any] | None
     not_carried: list[str]
     notes: list[str]
+    shots: list[dict[str, Any]] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """The information as JSON values."""
@@ -82,10 +88,54 @@ def info(path: StrPath, *, unlimited: bool = False) -> Info:
         InputError: no such file.
         FormatError: not a geometry video, or a damaged one.
     """
-    bitstream = read_file(check_path(path, "the geometry video"), unlimited)
-    outline = bitstream.outline or _decode(path, unlimited)
+    try:
+        bitstream = read_file(check_path(path, "the geometry video"), unlimited)
+    except SeveralShots:
+        return _capture_info(path, unlimited)
+    return _info(bitstream, bitstream.outline or _decode(path, unlimited), os.fspath(path))
+
+
+def _capture_info(path: StrPath, unlimited: bool) -> Info:
+    from gvpipe.playback.capture_player import CapturePlayer
+
+    with CapturePlayer(path, unlimited=unlimited) as video:
+        found = [_info(shot.bitstream, shot.outline(), shot.path) for shot in video.shots]
+        starts, sizes, size, sound = video.starts, video.shot_bytes, video.n_bytes, video.sound
+        beside = () if video.index is None else video.index.companions
+    sections = sum((Counter({**each.sections, "container": 0}) for each in found), Counter[str]())
+    for companion in beside:
+        sections[companion.kind] += companion.n_bytes
+    n_samples = sum(each.vertices * each.frames for each in found)
+    rows = [
+        {
+            "start": start,
+            "frames": each.frames,
+            "vertices": each.vertices,
+            "triangles": each.triangles,
+            "codec": each.codec,
+            "bytes": n_bytes,
+        }
+        for start, n_bytes, each in zip(starts, sizes, found, strict=True)
+    ]
+    return dataclasses.replace(
+        found[0],
+        layout=SHOTS,
+        audio=None if sound is None else sound.to_json(),
+        vertices=max(each.vertices for each in found),
+        triangles=max(each.triangles for each in found),
+        frames=sum(each.frames for each in found),
+        bytes=size,
+        bpvf=8 * size / n_samples,
+        sections={**sections, "container": size - sections.total()},
+        notes=list(dict.fromkeys(note for each in found for note in each.notes)),
+        not_carried=list(dict.fromkeys(name for each in found for name in each.not_carried)),
+        shots=rows,
+    )
+
+
+def _info(bitstream: Bitstream, outline: Outline, name: str) -> Info:
     size = bitstream.n_bytes
-    with in_file(os.fspath(path)):
+    with in_file(name):
         return Info(
             codec=bitstream.codec,
             version=bitstream.version,

@@ -111,7 +111,7 @@ def parse_view(text: str) -> tuple[float, float]:
 
 
 def framing(
-    sequence: Animation,
+    sequence: Animation | list[Animation],
     frames: Sequence[int] | None = None,
     view: str | tuple[float, float] = "three-quarter",
     up: str = "y",
@@ -126,6 +126,7 @@ def framing(
     inside. The planes' slopes are known beforehand, so that one pass over the frames finds target and distance.
 
     Args:
+        sequence: what moves; of several, all that they show together.
         frames: the frames that are to be seen; by default all.
         view: a name of `VIEWS`, or azimuth and elevation in degrees.
         aspect: width / height of the picture.
@@ -144,8 +145,9 @@ def framing(
     # an eye at z sees what has |x| <= slope_x (z - z of the point): planes of equal x / slope_x + z, and so on
     x, y, z = np.diag([1 / slope_x, 1 / slope_y, 1.0])
     normals = np.stack([x + z, z - x, y + z, z - y, z, -z]) @ rotations  # (A, 6, 3)
-    frames = range(len(sequence)) if frames is None else frames
-    reach = _reach(sequence, frames, normals.reshape(-1, 3), follow).reshape(-1, 6)
+    shown = sequence if isinstance(sequence, list) else [sequence]
+    reaches = [_reach(each, range(len(each)) if frames is None else frames, normals.reshape(-1, 3), follow) for each in shown]
+    reach = np.max(reaches, axis=0).reshape(-1, 6)
     middle = np.stack(
         [(reach[:, 0] - reach[:, 1]) * slope_x, (reach[:, 2] - reach[:, 3]) * slope_y, reach[:, 4] - reach[:, 5]], axis=1
     )
@@ -154,7 +156,7 @@ def framing(
     distance = float((reach[:, :4] - normals[:, :4] @ target).max())
     smallest = 1e-6 * float(np.abs(target).max())  # all at one point: any distance will do
     if follow:
-        target = target + middle_of(sequence.read(0, 1)[0], used_vertices(sequence))
+        target = target + middle_of(shown[0].read(0, 1)[0], used_vertices(shown[0]))
     tx, ty, tz = target.tolist()
     return Camera((tx, ty, tz), max(distance, smallest) or 1.0, azimuth, elevation, up)
 

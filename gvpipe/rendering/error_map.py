@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64, UInt8
-from gvpipe.metrics.comparison import aligned
+from gvpipe.metrics.pairing import aligned
 from gvpipe.metrics.vertex_errors import frame_diagonal
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import sampled, used_vertices

@@ -47,12 +47,19 @@ class FieldMap:
     ) -> None:
         self._field = _field_of(sequence, name)
         self._name, self._log, self._ramp = name, log, colormap(colors)
+        by_vertex = self._field.domain == "vertex" and len(sequence.faces)
+        self._rows: Array | slice = used_vertices(sequence) if by_vertex else slice(None)
         self.limits = self._limits_of(sequence, frames, limits)
 
     def numbers(self, frame: int) -> Float64:
         """``(R,)`` values, or magnitudes, of vertices or triangles; NaN where there is none."""
         frame = min(frame, len(self._field) - 1)
         return _lengths(self._field.read(frame, frame + 1)[0].astype(np.float64))
+
+    def drawn(self, frame: int) -> Float64:
+        """The numbers that a range counts: of vertices that triangles use, and on a log scale those above 0."""
+        drawn: Float64 = self.numbers(frame)[self._rows]
+        return drawn[drawn > 0] if self._log else drawn
 
     def values(self, frame: int) -> Float64:
         """Values as parts of the range: ``(V,)``, or ``(T, 1)`` of triangles; NaN where there is none."""
@@ -97,14 +104,7 @@ class FieldMap:
         wanted = checked_range(limits, log=self._log)
         if isinstance(wanted, tuple):
             return wanted
-        by_vertex = self._field.domain == "vertex" and len(sequence.faces)
-        rows: Array | slice = used_vertices(sequence) if by_vertex else slice(None)
-
-        def numbers(frame: int) -> Float64:
-            drawn: Float64 = self.numbers(frame)[rows]
-            return drawn[drawn > 0] if self._log else drawn
-
-        found = ends_of(numbers, frames, wanted)
+        found = ends_of(self.drawn, frames, wanted)
         if found is None and self._log:
             raise InputError(f"{sequence.name}: field {self._name!r} has no value above 0 to show; leave out the log scale")
         return found or (0.0, 0.0)

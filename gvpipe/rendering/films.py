@@ -18,6 +18,7 @@ from gvpipe.foundation.arrays import Float64, Int32, UInt8
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.progress import Progress
+from gvpipe.model.capture import Capture
 from gvpipe.model.part_choice import only_parts
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import Camera, framing, middle_of, used_vertices
@@ -87,28 +88,32 @@ class Film:
         if self.turntable:
             camera = replace(camera, azimuth=camera.azimuth + 360.0 * k / len(self))
         if self.follow:
-            x, y, z = np.asarray(camera.target) + self._middle(self.frames[k]) - self._first_middle
+            x, y, z = np.asarray(camera.target) + self.middle(self.frames[k]) - self._first_middle
             camera = replace(camera, target=(float(x), float(y), float(z)))
         return camera
 
     @kept
     def _first_middle(self) -> Float64:
-        return self._middle(0)
+        return self.middle(0)
 
     @kept
     def _used(self) -> Int32:
         return used_vertices(self.sequence)
 
-    def _middle(self, frame: int) -> Float64:
+    def middle(self, frame: int) -> Float64:
+        """``(3,)`` mean of a frame's vertices that triangles use."""
         return middle_of(self.sequence.read(frame, frame + 1)[0], self._used)
 
     def __getitem__(self, k: int) -> UInt8:
-        frame = self.frames[k]
+        return self.paint(self.frames[k], self.camera_of(k))
+
+    def paint(self, frame: int, camera: Camera) -> UInt8:
+        """A frame of the sequence, with its legend."""
         if self.cut is not None:
-            picture = self.cut.draw(frame, self.camera_of(k))
+            picture = self.cut.draw(frame, camera)
         else:
             values = self.shown.values(frame) if self.shown else None
-            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], self.camera_of(k), values, frame)
+            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], camera, values, frame)
         if self.legend is None:
             return picture
         legend = self.legend
@@ -183,7 +188,7 @@ def write_pictures(
     suffix = check_output(path, options)
     if options.error_max is not None and reference is None:
         raise InputError("error_max ends the colours of errors; give error_of too")
-    film = _plan(sequence, suffix, options, reference)
+    film = plan_film(sequence, drawn_frames(sequence, options.frame, suffix, options.turntable), suffix, options, reference)
     with unnamed_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
     return film.renderer.notes
@@ -215,10 +220,11 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[-1])
 
 
-def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, reference: MeshSequence | None) -> Film:
-    """Which frames, from where, with which colours."""
+def plan_film(
+    sequence: MeshSequence, frames: list[int], suffix: str, options: PictureOptions, reference: MeshSequence | None = None
+) -> Film:
+    """From where frames are painted, and with which colours; raises `InputError` as `write_pictures`."""
     (across, height), colors = options.size, "errors"
-    frames = _frames(sequence, options.frame, suffix, options.turntable)
     shown: ColourMap | None = None
     if reference is not None:
         if options.field is not None:
@@ -250,7 +256,8 @@ def _plan(sequence: MeshSequence, suffix: str, options: PictureOptions, referenc
     return Film(sequence, frames, camera, renderer, options.turntable, shown, legend, options.follow, cut)
 
 
-def _frames(sequence: MeshSequence, frame: int | None, suffix: str, turntable: bool) -> list[int]:
+def drawn_frames(sequence: MeshSequence | Capture, frame: int | None, suffix: str, turntable: bool) -> list[int]:
+    """The frame of each picture; raises `InputError` if there is no such frame."""
     count = len(sequence)
     if frame is not None and not -count <= frame < count:
         raise InputError(f"{sequence.name}: frame {frame} asked for; there are {count}, 0 to {count - 1} or -{count} to -1")

@@ -12,6 +12,7 @@ is measured and reported.
 from __future__ import annotations
 
 import base64
+import functools
 import html
 import os
 import zlib
@@ -94,6 +95,7 @@ def export_html(
     log: bool = False,
     speed: float = 1.0,
     warp: str | None = None,
+    clip: str | None = None,
     camera: str | tuple[float, float] | None = None,
     shading: str = "smooth",
     unlimited: bool = False,
@@ -115,6 +117,8 @@ def export_html(
         log: let colours follow the logarithm of the field; what is not above 0 is grey.
         speed: 0.0625 to 16; 1 is the video's own.
         warp: ``"NAME"`` or ``"NAME:SCALE"``: a field of vectors on vertices that moves them, so many times as far.
+        clip: a plane that cuts the mesh: ``"x=0.3"`` (model units), ``"y=30%"`` (of the first frame's box), ``"-x=0.3"``
+            (what lies below is left out). The section of a volume is filled.
         camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
         shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
@@ -148,6 +152,7 @@ def export_html(
         log=log,
         speed=speed,
         warp=warp,
+        clip=clip,
         camera=camera,
         shading=shading,
     )
@@ -204,7 +209,16 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
+def page_text(name: str, data: bytes, up: str, view: PageView, more: Sequence[bytes] = ()) -> str:
+    """A page that plays a geometry video.
+
+    Args:
+        name: path of the file, whose stem is the page's title.
+        data: of the file.
+        up: the axis that stands upright in the first view.
+        view: how it opens.
+        more: files that play behind it.
+    """
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
     values = {
@@ -213,13 +227,23 @@ def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, m
         "VIEW": view.attributes(),
         "NOTICE": (shipped / "LICENSES" / "NOTICE.txt").read_text("utf-8").strip(),
         "DIGITS": DIGITS,
-        "PLAYER": _base85(zlib.compress((shipped / "bundle" / "player.js").read_bytes(), 9)),
+        "PLAYER": _player(),
         "VIDEO": _base64(data),
         "LOOP": "" if more else " loop",
         "MORE": _behind(more) if more else "",
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
-    text = "".join(values[part] if i % 2 else part for i, part in enumerate(parts)).encode()
+    return "".join(values[part] if i % 2 else part for i, part in enumerate(parts))
+
+
+@functools.cache
+def _player() -> str:
+    """The player's bundle, as a page holds it."""
+    return _base85(zlib.compress((files("gvpipe.web") / "bundle" / "player.js").read_bytes(), 9))
+
+
+def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
+    text = page_text(name, data, up, view, more).encode()
     with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
     return ExportReport(len(text), len(data) + sum(map(len, more)))

@@ -1,4 +1,4 @@
-"""How a page opens: the field and its colours, speed, displacements, camera and shading, as attributes of ``<geometry-video>``.
+"""How a page opens: field and colours, speed, displacements, a cut, camera, shading, as attributes of ``<geometry-video>``.
 
 What is asked for is checked against the file when the page is written. Ranges that depend on values (percentiles, symmetric,
 those of a log scale) are looked up then, over all frames, by the code that `gvpipe.render` uses. The page has their numbers.
@@ -10,12 +10,15 @@ import html
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from gvpipe.foundation.arguments import check_number, did_you_mean, show
 from gvpipe.foundation.errors import InputError
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.warp import movers, parse_warp
 from gvpipe.rasterizer.camera import parse_view
 from gvpipe.rasterizer.renderer import SHADINGS
+from gvpipe.rendering.cut import AXES, parse_cut
 from gvpipe.rendering.field_map import FieldMap
 from gvpipe.rendering.field_range import Ends, Range, checked_range
 from gvpipe.rendering.films import WITHOUT_FIELD
@@ -35,6 +38,7 @@ class PageView:
         log: whether colours follow the logarithm.
         speed: of playing, `SLOWEST` to `FASTEST`; 1 is the video's own.
         warp: ``NAME`` or ``NAME:SCALE`` of a field that moves vertices, or None.
+        clip: a plane that cuts the mesh, ``x=0.3`` in model units, or None.
         camera: azimuth and elevation, degrees, or None for the player's own.
         shading: one of `gvpipe.rasterizer.renderer.SHADINGS`.
         muted: whether it is silent until its reader asks for the sound: browsers start silent films alone.
@@ -46,6 +50,7 @@ class PageView:
     log: bool = False
     speed: float = 1.0
     warp: str | None = None
+    clip: str | None = None
     camera: tuple[float, float] | None = None
     shading: str = SHADINGS[0]
     muted: bool = False
@@ -59,6 +64,7 @@ class PageView:
             "scale": "log" if self.log else None,
             "speed": None if self.speed == 1 else _number(self.speed),
             "warp": self.warp,
+            "clip": self.clip,
             "camera": _numbers(self.camera),
             "shading": None if self.shading == SHADINGS[0] else self.shading,
         }
@@ -75,6 +81,7 @@ def page_view(
     log: bool = False,
     speed: float = 1.0,
     warp: str | None = None,
+    clip: str | None = None,
     camera: str | tuple[float, float] | None = None,
     shading: str = SHADINGS[0],
 ) -> PageView:
@@ -101,6 +108,7 @@ def page_view(
         log,
         float(speed),
         None if warp is None else _warp(sequence, warp),
+        None if clip is None else _clip(sequence, clip),
         None if camera is None else _camera(name, camera),
         shading,
     )
@@ -136,6 +144,18 @@ def _warp(sequence: MeshSequence, text: str) -> str:
         message = f"{sequence.name} has no field of vectors {name!r} on its vertices to warp by; it has {fields}"
         raise InputError(f"{message}{did_you_mean(name, known)}")
     return text if text in known else f"{name}:{_number(scale)}"
+
+
+def _clip(sequence: MeshSequence, text: str) -> str:
+    """The attribute's value: a place in model units, where a part of the first frame's box may have been asked for."""
+    try:
+        cut = parse_cut(text)
+    except InputError as exc:
+        raise InputError(f"{sequence.name}: {exc}") from exc
+    place = cut.place
+    if cut.is_part:
+        place = cut.at(sequence.read(0, 1)[0].astype(np.float64), sequence.origin) + float(sequence.origin[cut.axis])
+    return f"{'-' if cut.sign < 0 else ''}{AXES[cut.axis]}={_number(place)}"
 
 
 def _camera(name: str, camera: str | tuple[float, float]) -> tuple[float, float]:

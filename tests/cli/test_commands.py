@@ -303,16 +303,6 @@ def bad_sources(folder: Path, sequence: MeshSequence) -> Iterator[tuple[str, tup
     yield "text", ("0.obj", "OBJ")
     for name, change, words in (
         ("gap", lambda p: p[4].unlink(), ("004", "walk_003.obj", "walk_005.obj")),
-        (
-            "other_count",
-            lambda p: p[4].write_text(obj_text(sequence.read(0, 1)[0][:-1], sequence.faces[:3])),
-            ("walk_004.obj", "71"),
-        ),
-        (
-            "other_faces",
-            lambda p: p[4].write_text(obj_text(sequence.read(0, 1)[0], sequence.faces[::-1])),
-            ("walk_004.obj", "walk_000.obj"),
-        ),
         ("nan", lambda p: p[4].write_text(p[4].read_text().replace("v ", "v nan ", 3)), ("walk_004.obj",)),
         ("empty_frame", lambda p: p[4].write_text(""), ("walk_004.obj",)),
         ("cut_frame", lambda p: p[4].write_bytes(p[4].read_bytes()[:1500]), ("walk_004.obj",)),

@@ -42,5 +42,6 @@ def test_showing_loads_no_renderer(sequence: MeshSequence) -> None:
     import subprocess
     import sys
 
-    program = "import sys; from gvpipe import MeshSequence, Player; print({'gvpipe.rendering', 'PIL'} & set(sys.modules))"
+    heavy = {"gvpipe.rendering", "PIL", "gvpipe.notebook", "IPython"}
+    program = f"import sys; from gvpipe import MeshSequence, Player; print({heavy} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout == "set()\n"

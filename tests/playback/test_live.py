@@ -49,6 +49,16 @@ def streamed() -> np.ndarray:
     return np.stack(list(StreamReader().feed(coded_stream(SEQUENCE, segment=CLIP))))
 
 
+def test_loops_may_write_every_frame_into_one_array(tmp_path: Path) -> None:
+    sheet = waving(4, 6)
+    frame = np.zeros((16, 3), np.float32)
+    with gvpipe.open_live(tmp_path / "a.mp4", sheet.faces) as live:
+        for positions in sheet:
+            frame[:] = positions
+            live.append(frame)
+    assert gvpipe.compare(sheet, gvpipe.open(tmp_path / "a.mp4")).max_diag == pytest.approx(0, abs=0.01)
+
+
 def test_it_opens_up_to_its_last_whole_clip(states: list[bytes], streamed: np.ndarray, tmp_path: Path) -> None:
     path = tmp_path / "a.mp4"
     for count, state in enumerate(states[:-1], 1):

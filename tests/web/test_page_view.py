@@ -79,6 +79,8 @@ def exported(file: Path, **view: Any) -> dict[str, str | None]:
         ({"camera": (30, -90.0)}, {"camera": "30,-90"}),
         ({"warp": "a:b"}, {"warp": "a:b"}),
         ({"warp": "a:b:1e3"}, {"warp": "a:b:1000"}),
+        ({"clip": "x=0.3"}, {"clip": "x=0.3"}),
+        ({"clip": "-z=-2e1"}, {"clip": "-z=-20"}),
         ({"field": ODD}, {"field": ODD}),
         ({"field": "a:b", "colormap": "magma"}, {"field": "a:b", "colormap": "magma"}),
         ({"field": "cell", "field_range": (-1, 2.5)}, {"field": "cell", "range": "-1,2.5"}),
@@ -117,6 +119,8 @@ def test_ranges_are_those_of_pictures(limits: str | None, log: bool, file: Path)
         ({"shading": "round"}, "shading 'round'; smooth or flat"),
         ({"camera": "up"}, "view 'up': one of three-quarter"),
         ({"camera": (0, 91)}, "camera 0,91; an azimuth and an elevation from -90 to 90"),
+        ({"clip": "w=3"}, "a plane 'w=3'; x=0.3, y=30% or -z=0.3 is needed"),
+        ({"clip": "x=nan"}, "a plane 'x=nan'"),
         ({"warp": "stress"}, "no field of vectors 'stress' on its vertices to warp by; it has 'a:b'"),
         ({"warp": "a:c"}, "no field of vectors 'a:c' .*; did you mean 'a:b'"),
         ({"warp": ":2"}, "NAME or NAME:SCALE is needed"),
@@ -128,6 +132,18 @@ def test_what_cannot_be_names_the_file(view: dict[str, Any], words: str, file: P
         gvpipe.export_html(file, tmp_path / "page.html", **view)
     assert str(caught.value).startswith(str(file)) and "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
+
+
+def test_parts_of_the_box_become_places(file: Path, tmp_path: Path) -> None:
+    """With the origin of a file that has one."""
+    sequence = simulation()
+    moved = MeshSequence(sequence.positions[:], sequence.faces, 24.0, origin=np.array([0.0, 1e6, 0.0]))
+    gvpipe.encode(moved, tmp_path / "far.mp4", "pca")
+    for path, offset in ((file, 0.0), (tmp_path / "far.mp4", 1e6)):
+        ((name, place),) = [str(exported(path, clip="-y=25%")["clip"]).split("=")]
+        with gvpipe.open(path) as video:
+            low, high = video[0][:, 1].min(), video[0][:, 1].max()
+        assert name == "-y" and float(place) == pytest.approx(float(low + 0.25 * (high - low)) + offset, abs=1e-6)
 
 
 def test_a_camera_of_another_type_is_a_mistake(file: Path, tmp_path: Path) -> None:

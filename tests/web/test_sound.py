@@ -43,7 +43,7 @@ def driver(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     if missing := browsers.missing(request.param):
         pytest.skip(missing)
     profile = tmp_path_factory.mktemp("profile")
-    server: AbstractContextManager[dict[str, str]] = nullcontext({})
+    server: AbstractContextManager[Any] = nullcontext({})
     if request.param == "firefox":
         server = browsers.sound_server(tmp_path_factory.mktemp("sound"))
     with server as more, browsers.browser(request.param, profile, more=more) as running:

@@ -95,7 +95,7 @@ def _listed(element: ElementTree.Element, above: str, depth: int) -> Iterator[tu
         name = each.get("name") or ""
         if each.tag == "DataSet" and each.get("file"):
             yield name or above, each.get("file") or ""
-        elif each.tag in ("Block", "Partitions"):
+        elif each.tag in ("Block", "Partitions", "Piece"):
             yield from _listed(each, name or above, depth + 1)
 
 

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
-from gvpipe.grids.cells import Cells, equal_cells, join_cells, structured_cells
+from gvpipe.grids.cells import POLYHEDRON, Cells, equal_cells, join_cells, structured_cells
+from gvpipe.grids.polyhedra import Polyhedra
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.dataset import DataArray, Dataset
@@ -24,6 +25,7 @@ from gvpipe.io.simulation.ensight_file import EnsightFile
 from gvpipe.io.simulation.limits import check_bytes
 from gvpipe.io.simulation.side_files import side_file
 from gvpipe.io.simulation.steps import read_steps
+from gvpipe.io.simulation.xml_grids import lattice
 from gvpipe.model.sequence import MeshSequence
 
 # elements: VTK's type and the number of nodes
@@ -174,7 +176,7 @@ def _read_geometry(file: EnsightFile) -> _Geometry:
 
 def _read_part(file: EnsightFile, has_node_ids: bool, has_element_ids: bool, word: str) -> _Part:
     number, name = int(file.integers(1)[0]), file.text()
-    kind = file.text()
+    kind = file.word()
     if kind.split()[:1] == ["block"]:
         return _read_block(file, number, name, kind)
     if kind != "coordinates":
@@ -197,12 +199,21 @@ def _read_part(file: EnsightFile, has_node_ids: bool, has_element_ids: bool, wor
 
 
 def _read_block(file: EnsightFile, number: int, name: str, kind: str) -> _Part:
-    if {"rectilinear", "uniform", "range"} & set(kind.split()):
+    words = set(kind.split())
+    if "range" in words:
         raise ValueError(f"{file.name}: part {number} is a {kind}, which is not read")
     sizes = file.rows(1, 3)[0].tolist()
     check_bytes(sizes, 12, 1 << 15, f"part {number}")
+    if min(sizes) < 1:
+        raise ValueError(f"{file.name}: part {number} has {sizes[0]} x {sizes[1]} x {sizes[2]} points")
     count = int(np.prod(sizes, dtype=np.int64))
-    points = file.floats(3 * count).reshape(3, -1).T
+    if "uniform" in words:
+        origin, steps = file.floats(3), file.floats(3)
+        points = lattice([origin[axis] + steps[axis] * np.arange(sizes[axis]) for axis in range(3)])
+    elif "rectilinear" in words:
+        points = lattice([file.floats(size) for size in sizes])
+    else:
+        points = file.floats(3 * count).reshape(3, -1).T
     if "iblanked" in kind:
         file.skip(count)
     return _Part(number, name, points, (("block", structured_cells((sizes[0], sizes[1], sizes[2]))),))
@@ -217,6 +228,13 @@ def _read_elements(file: EnsightFile, kind: str, has_ids: bool) -> Cells:
         sizes = file.integers(count).astype(np.int64)
         nodes = file.ragged(int(sizes.sum()), count).astype(np.int64) - 1
         return Cells(np.full(count, POLYGON, np.uint8), np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)]), nodes)
+    if plain == "nfaced":
+        counts = file.integers(count).astype(np.int64)
+        sizes = file.integers(int(counts.sum())).astype(np.int64)
+        polyhedra = Polyhedra(counts, sizes, file.ragged(int(sizes.sum()), len(sizes)).astype(np.int64) - 1)
+        corners, nodes = polyhedra.points()
+        ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(corners)])
+        return Cells(np.full(count, POLYHEDRON, np.uint8), ends, nodes, polyhedra)
     if plain not in ELEMENTS:
         raise ValueError(f"{file.name} has elements {kind[:20]!r}, which are not read")
     vtk, size = ELEMENTS[plain]

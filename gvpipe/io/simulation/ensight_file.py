@@ -74,6 +74,11 @@ class EnsightFile:
         self._line += 1
         return self._lines[self._line - 1].strip()
 
+    def word(self) -> str:
+        """The next text that is not empty; raises `ValueError` at the end."""
+        self.is_done()  # passes over empty lines
+        return self.text()
+
     def integers(self, count: int) -> Array:
         """The next integers, ``(count,)``."""
         if self.is_binary:

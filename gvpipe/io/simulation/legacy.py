@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Floats, Int64
-from gvpipe.grids.cells import Cells, join_cells, structured_cells
+from gvpipe.foundation.arrays import Array, Floats, Int64, UInt8
+from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells, structured_cells
+from gvpipe.grids.polyhedra import from_streams
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
 from gvpipe.io.simulation.limits import check_bytes
@@ -139,10 +140,12 @@ def load_legacy(path: Path) -> Dataset:
     head = data.split(b"\n", 3)
     if not head[0].startswith(b"# vtk DataFile Version") or len(head) < 4:
         raise ValueError("it does not start with '# vtk DataFile Version', or is cut short")
-    form = head[2].strip().upper()
-    if form not in (b"ASCII", b"BINARY"):
+    start = sum(len(line) + 1 for line in head[:2])
+    line = LINE.match(data, SPACE.match(data, start).end())  # type: ignore[union-attr]  # both match anything
+    form = b"" if line is None else line[0].strip().upper()
+    if line is None or form not in (b"ASCII", b"BINARY"):
         raise ValueError(f"its third line is {form[:40].decode('latin-1')!r}; ASCII or BINARY is needed")
-    cursor = _Cursor(data, sum(len(line) + 1 for line in head[:3]), form == b"BINARY")
+    cursor = _Cursor(data, line.end(), form == b"BINARY")
     parsed, kind = _Parsed(), ""
     where, rows = "", 0
     while word := cursor.word().upper():
@@ -190,7 +193,8 @@ def _cells(parsed: _Parsed, kind: str) -> Cells:
         if not parsed.lists or parsed.types is None:
             raise ValueError("it has no CELLS or no CELL_TYPES")
         offsets, nodes = parsed.lists[0]
-        return Cells(parsed.types.astype(np.uint8), offsets, nodes)
+        types = parsed.types.astype(np.uint8)
+        return _with_polyhedra(types, offsets, nodes) if (types == POLYHEDRON).any() else Cells(types, offsets, nodes)
     if kind == "POLYDATA":
         if not parsed.lists:
             raise ValueError("it has no polygons; a mesh is needed")
@@ -201,6 +205,23 @@ def _cells(parsed: _Parsed, kind: str) -> Cells:
     if parsed.dimensions is None:
         raise ValueError(f"its data set is {kind[:40]!r} without dimensions")
     return structured_cells(parsed.dimensions)
+
+
+def _with_polyhedra(types: UInt8, offsets: Int64, nodes: Int64) -> Cells:
+    """Cells whose polyhedra are streams of faces, by their points."""
+    if len(offsets) != len(types) + 1 or offsets[0] != 0 or offsets[-1] != len(nodes):
+        return Cells(types, offsets, nodes)  # which says what is wrong
+    is_polyhedron = types == POLYHEDRON
+    polyhedra = from_streams(nodes, offsets[:-1][is_polyhedron], offsets[1:][is_polyhedron])
+    counts, points = polyhedra.points()
+    sizes = np.diff(offsets)
+    sizes[is_polyhedron] = counts
+    ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    made = np.empty(ends[-1], np.int64)
+    own = np.repeat(is_polyhedron, sizes)
+    made[own] = points
+    made[~own] = nodes[np.repeat(~is_polyhedron, np.diff(offsets))]
+    return Cells(types, ends, made, polyhedra)
 
 
 def _read_cells(cursor: _Cursor, word: str) -> tuple[Int64, Int64]:

@@ -85,6 +85,8 @@ def read_by_meshio(path: Path) -> Arrays:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of NumPy, about how meshio calls it
             mesh: Any = meshio.read(path)
+    except UnicodeDecodeError as exc:
+        raise ValueError("it is no text, as meshio needs it (.inp is Abaqus; binary AVS UCD files are not read)") from exc
     except ValueError as exc:
         if not any(words in str(exc) for words in UNMATCHED):
             raise

@@ -16,7 +16,6 @@ from functools import partial
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats, Int64
-from gvpipe.grids.cells import Cells
 from gvpipe.io.simulation.dataset import DataArray, Dataset
 
 GHOSTS = "vtkGhostType"
@@ -99,7 +98,7 @@ def _welded(step: Dataset, welding: Welding) -> Dataset:
     target = number[np.where(is_own, np.arange(len(points)), welding.representative)]
     if cells.nodes.min(initial=0) < 0 or cells.nodes.max(initial=-1) >= len(points):
         return step  # whoever makes the surface says which cell that is
-    joined = Cells(cells.types, cells.offsets, target[cells.nodes])
+    joined = cells.renumbered(target)
     kept = points[rows]
     return replace(step, points=lambda: kept, cells=lambda: joined, point_data=_rows(step.point_data, rows))
 

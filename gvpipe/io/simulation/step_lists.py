@@ -7,6 +7,7 @@ sequence.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -172,10 +173,13 @@ def _from_xml(data: bytes) -> list[Listed]:
     root = parse_xml(data, "VTKFile")
     if root.get("type") != "Collection":
         raise ValueError("it is not a collection of VTK files")
-    found = root.findall("Collection/DataSet")
-    return [
-        (float(each.get("timestep") or number), each.get("file") or "", _part_of(each)) for number, each in enumerate(found)
-    ]
+    made: list[Listed] = []
+    steps: Counter[str] = Counter()  # by part: of entries without a time, which are numbered
+    for each in root.findall("Collection/DataSet"):
+        part = _part_of(each)
+        made.append((float(each.get("timestep") or steps[part]), each.get("file") or "", part))
+        steps[part] += 1
+    return made
 
 
 def _part_of(each: ElementTree.Element) -> str:

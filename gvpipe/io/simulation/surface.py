@@ -26,11 +26,12 @@ from gvpipe.grids.cells import (
     VOLUMES,
     Cells,
 )
-from gvpipe.io.left_behind import LeftBehind
+from gvpipe.io.left_behind import INNER_POINTS, VOLUME_CELLS, LeftBehind
 from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.mesh.unique_rows import row_ids
 
 QUADRATIC_POLYGON = 36
+POLYHEDRA = "polyhedra but for their surface"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
         cell = int(np.searchsorted(cells.offsets, out[0], side="right")) - 1
         raise ValueError(f"cell {cell} has node {cells.nodes[out[0]]}, but points are 0..{len(points) - 1}")
     _check_types(cells)
-    flat, solid = _flat_faces(cells), _solid_faces(cells)
+    flat, solid = _flat_faces(cells), _by_size([*_solid_faces(cells), *_polyhedron_faces(cells, points)])
     border = [faces.select(_occurs_once(faces.nodes)) for faces in solid]
     flat, n_covered = _uncovered(flat, solid)
     border = _turned_outwards(border, solid, points, len(cells.types))
@@ -85,23 +86,25 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
     if not groups:
         raise ValueError(f"its {len(cells.types)} cells have no surface; a mesh with triangles or volume cells is needed")
     counts, nodes, owners = _in_order(groups)
-    used = np.arange(len(points)) if not solid else np.unique(nodes)
+    used = np.arange(len(points)) if not solid else np.flatnonzero(_is_met(nodes, len(points)))
     number = np.zeros(len(points), np.int64)
     number[used] = np.arange(len(used))
     faces = number[nodes][fan(counts)].astype(np.int32)
     left = _left_behind(cells, n_covered)
     if solid:
-        left.add("points of no cell", len(points) - len(np.unique(cells.nodes)))
+        left.add("points of no cell", len(points) - int(_is_met(cells.nodes, len(points)).sum()))
     without_inside = left.names
-    _add_inside(left, cells, used)
+    _add_inside(left, cells, used, len(points))
     return Surface(used, faces, as_polygons(counts), np.repeat(owners, counts - 2), left.names, without_inside)
 
 
 def _check_types(cells: Cells) -> None:
     known = {*POINTS_AND_LINES, *OUTLINES, *VOLUMES, STRIP, POLYGON, QUADRATIC_POLYGON}
+    if cells.polyhedra is not None:
+        known.add(POLYHEDRON)
     strange = sorted(set(np.unique(cells.types).tolist()) - known)
     if strange:
-        name = "polyhedra" if strange[0] == POLYHEDRON else f"of type {strange[0]}"
+        name = "polyhedra without a list of their faces" if strange[0] == POLYHEDRON else f"of type {strange[0]}"
         count = int((cells.types == strange[0]).sum())
         raise ValueError(f"{count} of its cells are {name}, which are not read; save its surface (Extract Surface in ParaView)")
 
@@ -112,15 +115,24 @@ def _left_behind(cells: Cells, n_covered: int) -> LeftBehind:
     left.add("points and lines", int(np.isin(cells.types, list(POINTS_AND_LINES)).sum()))
     left.add("flat cells that are faces of volume cells", n_covered)
     left.add("curvature of cells of higher order", int(np.isin(cells.types, list(HIGHER_ORDER)).sum()))
+    left.add(POLYHEDRA, int((cells.types == POLYHEDRON).sum()))
     return left
 
 
-def _add_inside(left: LeftBehind, cells: Cells, used: Int64) -> None:
+def _add_inside(left: LeftBehind, cells: Cells, used: Int64, n_points: int) -> None:
     """Note what lies inside of the surface."""
     is_solid = np.isin(cells.types, list(VOLUMES))
-    left.add("volume cells", int(is_solid.sum()))
-    nodes = np.unique(cells.nodes[np.repeat(is_solid, cells.sizes)])
-    left.add("inner points", len(np.setdiff1d(nodes, used, assume_unique=True)))
+    left.add(VOLUME_CELLS, int(is_solid.sum()))
+    is_inner = _is_met(cells.nodes[np.repeat(is_solid, cells.sizes)], n_points)
+    is_inner[used] = False
+    left.add(INNER_POINTS, int(is_inner.sum()))
+
+
+def _is_met(nodes: Int64, n_points: int) -> Bool:
+    """``(N,)`` whether each point is among the nodes."""
+    is_met = np.zeros(n_points, bool)
+    is_met[nodes] = True
+    return is_met
 
 
 def _flat_faces(cells: Cells) -> list[_Faces]:
@@ -160,8 +172,8 @@ def _strips(cells: Cells) -> list[_Faces]:
 
 
 def _solid_faces(cells: Cells) -> list[_Faces]:
-    """Faces of volume cells, in groups of one number of nodes."""
-    groups: dict[int, list[_Faces]] = {}
+    """Faces of volume cells."""
+    found: list[_Faces] = []
     for kind, faces in VOLUMES.items():
         at = np.flatnonzero(cells.types == kind)
         if not len(at):
@@ -171,12 +183,48 @@ def _solid_faces(cells: Cells) -> list[_Faces]:
             raise ValueError(f"cell {at[small[0]]} of type {kind} has {cells.sizes[at[small[0]]]} nodes, which are too few")
         for rank, face in enumerate(faces):
             nodes = cells.nodes[cells.offsets[at, None] + np.array(face)]
-            made = _Faces(_from_middle(nodes, kind), at, np.full(len(at), rank, np.int64))
-            groups.setdefault(len(face), []).append(made)
+            found.append(_Faces(_from_middle(nodes, kind), at, np.full(len(at), rank, np.int64)))
+    return found
+
+
+def _by_size(made: list[_Faces]) -> list[_Faces]:
+    """Faces in groups of one number of nodes."""
+    groups: dict[int, list[_Faces]] = {}
+    for each in made:
+        groups.setdefault(each.nodes.shape[1], []).append(each)
     return [
         _Faces(*(np.concatenate([getattr(one, part) for one in group]) for part in ("nodes", "cells", "rank")))
         for group in groups.values()
     ]
+
+
+def _polyhedron_faces(cells: Cells, points: Floats) -> list[_Faces]:
+    """Faces of polyhedra, turned to look away from the middle of their cell."""
+    known = cells.polyhedra
+    if known is None or not len(known.sizes):
+        return []
+    out = np.flatnonzero((known.nodes < 0) | (known.nodes >= len(points)))
+    if len(out):
+        raise ValueError(f"a polyhedron has node {known.nodes[out[0]]}, but points are 0..{len(points) - 1}")
+    number = np.repeat(np.arange(len(known.counts)), known.counts)  # of each face's polyhedron
+    corners = points[known.nodes].astype(np.float64)
+    of_corner = np.repeat(number, known.sizes)
+    total = np.stack([np.bincount(of_corner, corners[:, axis], len(known.counts)) for axis in range(3)], axis=1)
+    middles = total / np.maximum(np.bincount(of_corner, minlength=len(known.counts)), 1)[:, None]
+    owners = np.flatnonzero(cells.types == POLYHEDRON)[number]
+    rank = np.arange(len(number)) - np.repeat(np.cumsum(known.counts) - known.counts, known.counts)
+    starts = np.cumsum(known.sizes) - known.sizes
+    made = []
+    for size in np.unique(known.sizes).tolist():
+        at = np.flatnonzero(known.sizes == size)
+        nodes = known.nodes[starts[at, None] + np.arange(size)]
+        places = points[nodes].astype(np.float64)
+        around = places - places.mean(axis=1, keepdims=True)
+        normals = np.cross(around, np.roll(around, -1, axis=1)).sum(axis=1)
+        inwards = (normals * (places.mean(axis=1) - middles[number[at]])).sum(axis=1) < 0
+        nodes[inwards, 1:] = nodes[inwards, :0:-1]
+        made.append(_Faces(nodes, owners[at], rank[at]))
+    return made
 
 
 def _from_middle(nodes: Int64, kind: int) -> Int64:

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Float64, Floats, Int64
-from gvpipe.grids.cells import Cells, join_cells
+from gvpipe.foundation.arrays import Array, Float64, Floats, Int64, UInt8
+from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells
+from gvpipe.grids.polyhedra import Polyhedra, from_faces
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import MOST_DEPTH, join_blocks
@@ -33,6 +34,7 @@ UNIT = "Units"  # attribute of an array; gvpipe's own
 LONGEST_UNIT = 100  # characters
 POLY_GROUPS = {"Vertices": POLY_CELLS["Verts"], "Lines": POLY_CELLS["Lines"], "Polygons": POLY_CELLS["Polys"],
                "Strips": POLY_CELLS["Strips"]}  # fmt: skip
+POLYHEDRON_SIZES = ("NumberOfFaces", "NumberOfFaceConnectivityIds", "NumberOfPolyhedronToFaceIds")
 MAX_STEPS = 10_000_000
 
 
@@ -253,9 +255,35 @@ class VtkHdfSteps:
                 if kind is None
                 else np.full(n_cells, kind, np.uint8)
             )
-            pieces.append(Cells(types, offsets, nodes))
+            pieces.append(Cells(types, offsets, nodes, self._polyhedra(types, cell, number)))
             cell, node = cell + n_cells, node + n_nodes
         return pieces
+
+    def _polyhedra(self, types: UInt8, cell: int, number: int) -> Polyhedra | None:
+        """The faces of a part's polyhedra; None where there are none, or in a file of several steps.
+
+        Args:
+            types: of the part's cells.
+            cell: number of the first of them in the file.
+            number: of the part.
+        """
+        at = np.flatnonzero(types == POLYHEDRON)
+        if not len(at) or self._file.find(f"{self._root}/PolyhedronOffsets") is None or self._is_temporal:
+            return None
+        if any(len(self._sizes(name)) <= number for name in POLYHEDRON_SIZES):
+            raise ValueError(f"it has no sizes of the polyhedra of part {number}")
+        face, corner, listed = (int(self._sizes(name)[:number].sum()) for name in POLYHEDRON_SIZES)
+        n_faces, n_corners, n_listed = (int(self._sizes(name)[number]) for name in POLYHEDRON_SIZES)
+
+        def read(name: str, start: int, count: int) -> Int64:
+            return self._file.read(f"{self._root}/{name}", start, start + count).astype(np.int64).reshape(-1)
+
+        return from_faces(
+            read("PolyhedronOffsets", cell + number, len(types) + 1),
+            read("PolyhedronToFaces", listed, n_listed),
+            read("FaceOffsets", face + number, n_faces + 1),
+            read("FaceConnectivity", corner, n_corners),
+        ).select(at)
 
     def _data(self, group: str, step: int, start: int, count: int) -> dict[str, DataArray]:
         roles = {self._file.attribute(f"{self._root}/{group}", role): kind for role, kind in ROLES.items()}

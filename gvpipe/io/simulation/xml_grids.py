@@ -5,15 +5,16 @@ Pieces are joined in their order; points that two pieces share stay apart, as in
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Floats
-from gvpipe.grids.cells import Cells, join_cells, structured_cells
+from gvpipe.foundation.arrays import Array, Floats, Int64
+from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells, structured_cells
+from gvpipe.grids.polyhedra import Polyhedra, from_faces, from_streams
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, join_arrays, text_array
 from gvpipe.io.simulation.limits import check_bytes
@@ -23,6 +24,7 @@ from gvpipe.io.simulation.xml_arrays import TYPES, VtkXml, parse_vtk_xml, read_a
 
 KINDS = ("PolyData", "UnstructuredGrid", "StructuredGrid", "RectilinearGrid", "ImageData")
 PARALLEL = tuple(f"P{kind}" for kind in KINDS[:2])
+FACE_ARRAYS = ("face_connectivity", "face_offsets", "polyhedron_to_faces", "polyhedron_offsets")
 POLY_CELLS = {"Verts": 2, "Lines": 4, "Polys": 7, "Strips": 6}
 ROLES = {"Normals": "normal", "TCoords": "uv"}  # which attribute of PointData names the array of a kind
 Source = tuple[VtkXml, ElementTree.Element]
@@ -159,7 +161,29 @@ def _unstructured(file: VtkXml, piece: ElementTree.Element) -> Cells:
     offsets = read_array(file, found["offsets"], count).astype(np.int64)
     nodes = read_array(file, found["connectivity"]).astype(np.int64).reshape(-1)
     types = read_array(file, found["types"], count).astype(np.uint8)
-    return Cells(types, np.concatenate([np.zeros(1, np.int64), offsets]), nodes)
+    return Cells(types, np.concatenate([np.zeros(1, np.int64), offsets]), nodes, _polyhedra(file, found, types))
+
+
+def _polyhedra(file: VtkXml, found: Mapping[str | None, ElementTree.Element], types: Array) -> Polyhedra | None:
+    """The faces of polyhedra: by numbers, as VTK 9.4 and later write them, or as streams; None where there are none."""
+    at = np.flatnonzero(types == POLYHEDRON)
+    if not len(at):
+        return None
+
+    def read(name: str, count: int | None = None) -> Int64:
+        return read_array(file, found[name], count).astype(np.int64).reshape(-1)
+
+    if set(FACE_ARRAYS) <= set(found):
+        nodes, face_ends, faces, ends = (read(name) for name in FACE_ARRAYS)
+        bounds = np.concatenate([np.zeros(1, np.int64), ends])
+        if len(ends) != len(types):
+            raise ValueError(f"polyhedron_offsets has {len(ends)} rows, and there are {len(types)} cells")
+        made = from_faces(bounds, faces, np.concatenate([np.zeros(1, np.int64), face_ends]), nodes)
+        return made.select(at)
+    if {"faces", "faceoffsets"} <= set(found):
+        stops = read("faceoffsets", len(types))[at]
+        return from_streams(read("faces"), np.concatenate([np.zeros(1, np.int64), stops[:-1]]), stops)
+    return None
 
 
 def _poly_cells(file: VtkXml, piece: ElementTree.Element) -> Cells:

@@ -16,6 +16,24 @@ export const ENCODER_CODED = 1;
 // gvpipe.asset_coding.times
 export const TIMES_SECTION = "times";
 
+// gvpipe.asset_coding.volume_list
+export const VOLUME_LIST_SECTION = "volume";
+export const VOLUME_LIST_CELLS = "volume.cells";
+export const VOLUME_LIST_ORDER = "volume.order";
+export const VOLUME_LIST_POINTS = "volume.points";
+export const VOLUME_LIST_VERSION = 1;
+export const VOLUME_LIST_IN_ORDER = 0;
+export const VOLUME_LIST_BY_WALK = 1;
+export const VOLUME_LIST_MAX_BYTES = 16777216;
+export const VOLUME_LIST_MOST_CELLS = 1073741824;
+export const VOLUME_LIST_MOST_POINTS = 16777216;
+
+// gvpipe.asset_coding.volume_reader
+export const VOLUME_READER_BYTES_PER_CELL = 1200;
+export const VOLUME_READER_SECONDS_PER_CELL = 6e-06;
+export const VOLUME_READER_BYTES_PER_POINT = 1500;
+export const VOLUME_READER_SECONDS_PER_POINT = 8e-06;
+
 // gvpipe.attributes.linear_kernels
 export const LINEAR_KERNELS_AFFINE = 4;
 export const LINEAR_KERNELS_PARALLELOGRAM = 2;
@@ -51,6 +69,15 @@ export const ADAPTIVE_ORDER_MAX_VERTICES = 65536;
 // gvpipe.connectivity.base_mesh
 export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];
 export const BASE_MESH_MAX_PER_BYTE = 1024;
+
+// gvpipe.connectivity.cell_kernels
+export const CELL_KERNELS_N_CONTEXTS = 526;
+
+// gvpipe.connectivity.cell_poses
+export const CELL_POSES_KINDS = [10, 12, 13, 14];
+export const CELL_POSES_MOST_POSES = 24;
+export const CELL_POSES_MOST_NODES = 8;
+export const CELL_POSES_MOST_FACES = 6;
 
 // gvpipe.connectivity.edge_seam_kernels
 export const EDGE_SEAM_KERNELS_CONTEXTS = 0;
@@ -158,6 +185,15 @@ export const ERRORS_REMEDY = "get the file again from its source";
 export const DERIVED_MAGNITUDE = 1;
 export const DERIVED_SIGNALS = [6, 1];
 
+// gvpipe.fields.graph
+export const GRAPH_MOST_RING = 12;
+export const GRAPH_MOST_BEYOND = 8;
+export const GRAPH_MOST_WAVES = 200;
+export const GRAPH_RING_VARIANCE = 0.3;
+export const GRAPH_FAR_VARIANCE = 0.1;
+export const GRAPH_SURE = 512.0;
+export const GRAPH_LEAST = 0.05;
+
 // gvpipe.fields.head
 export const HEAD_MAX_VALUES = 16777216;
 export const HEAD_VERSION = 1;
@@ -183,6 +219,10 @@ export const SEGMENT_DERIVED = 3;
 
 // gvpipe.fields.values
 export const VALUES_MAX_COMPONENTS = 256;
+
+// gvpipe.grids.cells
+export const CELLS_VOLUMES = new Map([[10, [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]], [11, [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]], [12, [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]]], [13, [[0, 1, 2], [3, 5, 4], [0, 3, 4, 1], [1, 4, 5, 2], [2, 5, 3, 0]]], [14, [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]], [15, [[0, 4, 3, 2, 1], [5, 6, 7, 8, 9], [0, 1, 6, 5], [1, 2, 7, 6], [2, 3, 8, 7], [3, 4, 9, 8], [4, 0, 5, 9]]], [16, [[0, 5, 4, 3, 2, 1], [6, 7, 8, 9, 10, 11], [0, 1, 7, 6], [1, 2, 8, 7], [2, 3, 9, 8], [3, 4, 10, 9], [4, 5, 11, 10], [5, 0, 6, 11]]], [24, [[0, 4, 1, 8, 3, 7], [1, 5, 2, 9, 3, 8], [2, 6, 0, 7, 3, 9], [0, 6, 2, 5, 1, 4]]], [25, [[0, 16, 4, 15, 7, 19, 3, 11], [1, 9, 2, 18, 6, 13, 5, 17], [0, 8, 1, 17, 5, 12, 4, 16], [3, 19, 7, 14, 6, 18, 2, 10], [0, 11, 3, 10, 2, 9, 1, 8], [4, 12, 5, 13, 6, 14, 7, 15]]], [26, [[0, 6, 1, 7, 2, 8], [3, 11, 5, 10, 4, 9], [0, 12, 3, 9, 4, 13, 1, 6], [1, 13, 4, 10, 5, 14, 2, 7], [2, 14, 5, 11, 3, 12, 0, 8]]], [27, [[0, 8, 3, 7, 2, 6, 1, 5], [0, 5, 1, 10, 4, 9], [1, 6, 2, 11, 4, 10], [2, 7, 3, 12, 4, 11], [3, 8, 0, 9, 4, 12]]], [29, [[0, 16, 4, 15, 7, 19, 3, 11], [1, 9, 2, 18, 6, 13, 5, 17], [0, 8, 1, 17, 5, 12, 4, 16], [3, 19, 7, 14, 6, 18, 2, 10], [0, 11, 3, 10, 2, 9, 1, 8], [4, 12, 5, 13, 6, 14, 7, 15]]], [31, [[0, 6, 1, 7, 2, 8], [3, 11, 5, 10, 4, 9], [0, 3, 9, 4, 1, 6], [1, 4, 10, 5, 2, 7], [2, 5, 11, 3, 0, 8]]], [32, [[0, 6, 1, 7, 2, 8], [3, 11, 5, 10, 4, 9], [0, 12, 3, 9, 4, 13, 1, 6], [1, 13, 4, 10, 5, 14, 2, 7], [2, 14, 5, 11, 3, 12, 0, 8]]], [33, [[0, 16, 4, 15, 7, 19, 3, 11], [1, 9, 2, 18, 6, 13, 5, 17], [0, 8, 1, 17, 5, 12, 4, 16], [3, 19, 7, 14, 6, 18, 2, 10], [0, 11, 3, 10, 2, 9, 1, 8], [4, 12, 5, 13, 6, 14, 7, 15]]], [37, [[0, 8, 3, 7, 2, 6, 1, 5], [0, 5, 1, 10, 4, 9], [1, 6, 2, 11, 4, 10], [2, 7, 3, 12, 4, 11], [3, 8, 0, 9, 4, 12]]], [71, [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]], [72, [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]]], [73, [[0, 1, 2], [3, 5, 4], [0, 3, 4, 1], [1, 4, 5, 2], [2, 5, 3, 0]]], [74, [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]], [78, [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]], [79, [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]]], [80, [[0, 1, 2], [3, 5, 4], [0, 3, 4, 1], [1, 4, 5, 2], [2, 5, 3, 0]]], [81, [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]]]);
+export const CELLS_SIZES = new Map([[1, 1], [3, 2], [5, 3], [8, 4], [9, 4], [10, 4], [11, 8], [12, 8], [13, 6], [14, 5], [15, 10], [16, 12], [21, 3], [22, 6], [23, 8], [24, 10], [25, 20], [26, 15], [27, 13], [28, 9], [29, 27], [30, 6], [31, 12], [32, 18], [33, 24], [34, 7], [35, 4], [37, 19]]);
 
 // gvpipe.media.video
 export const VIDEO_MAX_SIDE = 16384;

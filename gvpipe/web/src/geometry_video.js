@@ -14,6 +14,7 @@ import { describedIn, describedSound, geometryOf, soundOf } from "./format/compa
 import { GeometryVideoError } from "./format/errors.js";
 import { readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
+import { isRangeSource } from "./format/range_source.js";
 import { OUTAGE, closed, request } from "./format/request.js";
 import { StreamFile } from "./format/stream_file.js";
 import { MovingImages } from "./moving/moving_images.js";
@@ -35,7 +36,8 @@ export class GeometryVideo {
   /**
    * Load a geometry video, as `gvpipe encode` writes it.
    *
-   * @param {string|URL|Blob|ArrayBuffer|Uint8Array} source an address, or the file itself
+   * @param {string|URL|Blob|ArrayBuffer|Uint8Array|import("./format/range_source.js").RangeSource} source an address, the file itself, or what
+   *   gives parts of it
    * @param {{level?: number|"coarsest", signal?: AbortSignal}} [options] a level of detail above 0 is a coarser mesh, without attributes
    *   and fields; `signal` ends loading
    * @returns {Promise<GeometryVideo>}
@@ -140,6 +142,8 @@ export class GeometryVideo {
   constructor(header, byteLength, repeated, reader, pictures) {
     this.frameCount = header.frames;
     this.fps = header.fps;
+    /** What positions count from, model units: a point of the source. */
+    this.origin = header.origin ?? [0, 0, 0];
     /** Of the whole file. */
     this.byteLength = byteLength;
     this.#repeated = repeated;
@@ -401,6 +405,8 @@ export class GeometryVideo {
     this.images = asset.images;
     /** (P) corners of each polygon, or null if all are triangles. */
     this.polygons = asset.polygons;
+    /** What lies inside of the surface (`volume/volume.js`), or null. */
+    this.volume = asset.volume;
     this.metadata = asset.metadata;
     /** What of the file is not read, a line each. */
     this.notes = [...asset.notes, ...this.#soundNotes];
@@ -451,13 +457,14 @@ function companionsOf(file, described) {
 /** @throws {TypeError} it is nothing that can be loaded */
 function checkSource(source) {
   const isText = typeof source === "string" ? source !== "" : source instanceof URL;
-  if (isText || source instanceof Blob || source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return;
+  if (isText || isRangeSource(source) || source instanceof Blob || source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return;
   const found = source === "" ? "empty" : Object.prototype.toString.call(source).slice(8, -1);
   throw new TypeError(`the source is ${found}; an address, a Blob or bytes are needed`);
 }
 
 /** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
 async function openParts(source, signal) {
+  if (isRangeSource(source)) return StreamFile.open(source, signal);
   if (!(typeof source === "string" || source instanceof URL)) return null;
   return /^https?:$/.test(addressOf(source).protocol) ? StreamFile.open(source, signal) : null;
 }

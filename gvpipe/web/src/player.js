@@ -5,4 +5,5 @@ import { GeometryVideoElement } from "./player/element.js";
 export { GeometryVideo, GeometryVideoError } from "./geometry_video.js";
 export { GeometryVideoElement };
 
-globalThis.customElements?.define("geometry-video", GeometryVideoElement);
+const { customElements } = globalThis;
+if (!customElements?.get("geometry-video")) customElements?.define("geometry-video", GeometryVideoElement); // a page may load it twice

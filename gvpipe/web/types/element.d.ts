@@ -1,6 +1,6 @@
 /** The element `<geometry-video>`; to import this defines it. */
 
-import type { GeometryVideo, Picked, Source } from "./geometry-video.js";
+import type { Cut, GeometryVideo, Picked, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -9,8 +9,14 @@ export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, 
   ready: CustomEvent<null>;
   /** The number of the frame that is shown. */
   frame: CustomEvent<number>;
+  /** Azimuth and elevation, degrees, that a user or `turnTo` turned to. */
+  viewchange: CustomEvent<[number, number]>;
+  /** Names of the parts that are hidden, after a choice in the menu. */
+  partschange: CustomEvent<string[]>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
+  /** The cut that is shown, or null. */
+  clip: CustomEvent<Cut | null>;
   /** A point was clicked on. */
   probe: CustomEvent<Probed>;
   /** `detail` is a `GeometryVideoError` if the file or its server is at fault. */
@@ -74,8 +80,16 @@ export class GeometryVideoElement extends HTMLElement {
   scale: "linear" | "log";
   /** The field that moves vertices, and how far; attribute `warp`, such as "displacement:10". */
   readonly warp: { name: string; scale: number } | null;
+  /** The plane that cuts the mesh; attribute `clip`, such as "x=0.3", "y=30%" or "-x=0.3". */
+  readonly clip: Cut | null;
+  /** (n, 3, 3) corners of the triangles of the cut's section, model units, the file's origin apart; empty where it is hollow. */
+  readonly section: Float32Array;
   /** Azimuth and elevation of the first view, degrees, or null: the player's own; attribute `camera`. */
   readonly camera: [number, number] | null;
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  readonly view: [number, number] | null;
+  /** Turns the camera about its target; degrees. */
+  turnTo(azimuth: number, elevation: number): void;
   readonly hiddenParts: Set<string>;
   /** Hides the parts of these names, and shows all others. */
   hide(names: string | Iterable<string>): void;

@@ -1,6 +1,13 @@
 /** A geometry video: its mesh, and the positions of any frame. */
 
-export type Source = string | URL | Blob | ArrayBuffer | Uint8Array;
+/** A file whose bytes a function gives, fewer where it ends; `stop` may be Infinity. */
+export interface RangeSource {
+  /** For messages. */
+  readonly name: string;
+  fetchRange(start: number, stop: number, signal: AbortSignal): Promise<{ data: Uint8Array; size: number }>;
+}
+
+export type Source = string | URL | Blob | ArrayBuffer | Uint8Array | RangeSource;
 export type Domain = "vertex" | "corner" | "triangle" | "part";
 export type Kind = "uv" | "normal" | "tangent" | "color" | "scalar" | "vector" | "label";
 export type Values =
@@ -69,7 +76,8 @@ export interface Attribute {
 /** Numbers that change from frame to frame. */
 export interface Field {
   readonly name: string;
-  readonly domain: "vertex" | "triangle";
+  /** Of a volume `point` or `cell`. */
+  readonly domain: "vertex" | "triangle" | "point" | "cell";
   readonly kind: Kind;
   readonly components: number;
   readonly unit: string;
@@ -82,6 +90,45 @@ export interface Field {
   readonly range: [number, number] | null;
   /** Rows of `components` in frame k, NaN for holes. */
   frame(k: number): Promise<Values>;
+}
+
+/** Cells inside of a surface. Points are numbered: first the surface's vertices, then inner points. */
+export interface Grid {
+  /** VTK's number of each cell's type. */
+  readonly types: Uint8Array;
+  /** Where each cell's nodes start, and the end. */
+  readonly offsets: Int32Array;
+  readonly nodes: Int32Array;
+  /** The surface's triangle whose numbers a cell has; -1: an inner cell. */
+  readonly triangles: Int32Array;
+  /** Numbers of the inner cells. */
+  readonly inner: Int32Array;
+}
+
+/** What lies inside of a surface. It is decoded when it is asked for. */
+export interface Volume {
+  readonly cellCount: number;
+  /** Of inner points. */
+  readonly pointCount: number;
+  /** Largest error of a coordinate of an inner point. */
+  readonly bound: number;
+  /** Decodes the cells. */
+  open(): Promise<Grid>;
+  /** Coordinates of the inner points, once it is open; null: there are none. */
+  readonly points: Field | null;
+  /** Numbers of inner points, or of inner cells, once it is open; null: there are none of that name. */
+  number(domain: "point" | "cell", name: string): { readonly field: Field | null; readonly moves: boolean } | null;
+}
+
+/** A plane across an axis. */
+export interface Cut {
+  /** 0, 1, 2: x, y, z. */
+  readonly axis: number;
+  /** Along the axis, model units with the file's origin; a part of the first frame's box if `isPart`. */
+  readonly place: number;
+  readonly isPart: boolean;
+  /** 1: what lies above is left out; -1: what lies below. */
+  readonly sign: 1 | -1;
 }
 
 /** A point of the mesh that was pointed at. */
@@ -177,6 +224,8 @@ export class GeometryVideo {
   readonly frameCount: number;
   /** Frames per second. */
   readonly fps: number;
+  /** What positions count from, model units: a point of the source. */
+  readonly origin: [number, number, number];
   readonly vertexCount: number;
   readonly triangleCount: number;
   /** Bytes of the file. */
@@ -230,6 +279,8 @@ export class GeometryVideo {
   readonly images: Image[];
   /** Corners of each polygon; null if all are triangles. */
   readonly polygons: Int32Array | null;
+  /** What lies inside of the surface; null: nothing. */
+  readonly volume: Volume | null;
   readonly metadata: Record<string, unknown>;
   /** What of the file is not read, a line each. */
   readonly notes: string[];

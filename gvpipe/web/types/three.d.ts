@@ -1,7 +1,7 @@
 /** Geometry videos in scenes of three.js. */
 
 import type { BufferGeometry, Loader, LoadingManager, Material as ThreeMaterial, Mesh, Object3DEventMap, Ray, Texture as ThreeTexture } from "three";
-import type { GeometryVideo, Picked, Source } from "./geometry-video.js";
+import type { Cut, GeometryVideo, Picked, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -99,6 +99,13 @@ export class GeometryVideoMesh extends MeshOfVideo {
    * shown; false if another call came since.
    */
   setWarp(name: string | null, scale?: number): Promise<boolean>;
+  /**
+   * Leaves out what lies on one side of a plane across an axis; null: nothing. The section of a volume is filled. The renderer needs
+   * `localClippingEnabled`. A promise whether it is shown; false if another call came since.
+   */
+  setClip(cut: Cut | null): Promise<boolean>;
+  /** (n, 3, 3) corners of the triangles of that section, model units, the file's origin apart; empty where the cut is hollow. */
+  readonly section: Float32Array;
   /** The box that the motion stays in, displacements with it, model units. It may grow. */
   readonly bounds: { min: [number, number, number]; max: [number, number, number] };
   /** What of the frame shown a ray meets first, hidden parts apart, in the geometry's units; of a triangle, its nearest vertex. */

@@ -95,7 +95,7 @@ def test_strips_polygons_and_pixels() -> None:
     ("kind", "nodes", "message"),
     [
         (5, [0, 1, 9], "node 9"),
-        (42, [0, 1, 2], "polyhedra"),
+        (42, [0, 1, 2], "polyhedra without a list of their faces"),
         (99, [0, 1, 2], "type 99"),
         (3, [0, 1], "no surface"),
     ],

@@ -135,3 +135,76 @@ class TestVtk:
         (path.parent / "constant/polyMesh/points").unlink()
         with pytest.raises(InputError, match=r"case.foam: frame 0 cannot be read"):
             gvpipe.read(path)
+
+    def test_times_that_data_sets_tell(self) -> None:
+        """``TimeValue`` of field data, of a block too, or VTK's own time of a step; none where they do not differ."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+        from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkMultiBlockDataSet
+
+        def timed(time: float, way: str) -> Any:
+            made = self.cube(0, "grid")
+            if way == "step":
+                made.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), time)
+                return made
+            array = numpy_to_vtk(np.array([time]), deep=True)
+            array.SetName("TimeValue")
+            made.GetFieldData().AddArray(array)
+            if way == "block":
+                blocks = vtkMultiBlockDataSet()
+                blocks.SetBlock(0, made)
+                return blocks
+            return made
+
+        for way in ("field", "block", "step"):
+            found = gvpipe.from_vtk([timed(time, way) for time in (1.0, 1.25, 1.5)])
+            assert found.fps == 4 and np.array_equal(found.times, [1, 1.25, 1.5]), way
+            assert not any("TimeValue" in name for name in found.not_carried)
+        assert gvpipe.from_vtk([timed(3.0, "field")] * 3).times[0] == 0
+        assert gvpipe.from_vtk([timed(1.0, "field"), self.cube(0, "grid")]).times[0] == 0
+        given = gvpipe.from_vtk([timed(time, "field") for time in (1.0, 2.0)], times=[0, 0.1])
+        assert given.fps == pytest.approx(10)
+
+    def test_numbers_of_parts_are_parts(self, tmp_path: Path) -> None:
+        """What gvpipe writes, read by VTK's own reader."""
+        from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+        one = gvpipe.from_vtk(self.cube(0, "grid"))
+        parts = (gvpipe.Part("lid", (0, 26), (0, 20)), gvpipe.Part("Körper", (0, 26), (20, 48)))
+        gvpipe.write(gvpipe.MeshSequence(one[:], one.faces, parts=parts), tmp_path / "a.vtu")
+        reader = vtkXMLUnstructuredGridReader()
+        reader.SetFileName(str(tmp_path / "a.vtu"))
+        reader.Update()
+        found = gvpipe.from_vtk(reader.GetOutput())
+        assert [(part.name, part.triangles) for part in found.parts] == [("lid", (0, 20)), ("Körper", (20, 48))]
+        assert not found.fields and not found.attributes and not any("part" in name for name in found.not_carried)
+
+    def test_structured_grids(self) -> None:
+        """Of CGNS files, for one; their number of points is asked in another way."""
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkStructuredGrid
+
+        grid, points = vtkStructuredGrid(), vtkPoints()
+        for k in range(27):
+            points.InsertNextPoint(k % 3, k // 3 % 3, k // 9)
+        grid.SetDimensions(3, 3, 3)
+        grid.SetPoints(points)
+        assert gvpipe.from_vtk(grid).n_vertices == 26
+
+    def test_polyhedra_have_a_surface(self) -> None:
+        from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
+        from vtkmodules.vtkCommonDataModel import VTK_POLYHEDRON, vtkUnstructuredGrid
+
+        grid, points, stream = vtkUnstructuredGrid(), vtkPoints(), vtkIdList()
+        for point in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]:
+            points.InsertNextPoint(point)
+        for number in [4, 3, 0, 2, 1, 3, 0, 1, 3, 3, 1, 2, 3, 3, 2, 0, 3]:
+            stream.InsertNextId(number)
+        grid.SetPoints(points)
+        grid.InsertNextCell(VTK_POLYHEDRON, stream)
+        found = gvpipe.from_vtk(grid)
+        assert len(found.faces) == 4 and found.not_carried == ("polyhedra but for their surface",)
+
+    def test_pyvista_s_blocks_have_their_names(self) -> None:
+        pyvista = pytest.importorskip("pyvista")
+        blocks = pyvista.MultiBlock({"plate": pyvista.Plane(), "ball": pyvista.Sphere()})
+        assert [part.name for part in gvpipe.from_pyvista(blocks).parts] == ["plate", "ball"]

@@ -19,20 +19,20 @@ import { decodeAttribute } from "../attributes/attribute_coding.js";
 import { Surface } from "../attributes/surface.js";
 import { decodeArrangement } from "../attributes/triangle_order.js";
 import { corrupt } from "../format/errors.js";
-import { inflate } from "../format/inflate.js";
 import { CodedField } from "../fields/coded_field.js";
 import { FieldHost } from "../fields/field_host.js";
 import { TYPES } from "../fields/head.js";
 import { readReduction } from "../fields/reduction.js";
 import { Kernels } from "../wasm/kernels.js";
+import { hasVolume, readVolume } from "../volume/volume.js";
 import { kernelCode } from "../wasm/inflated.js";
 import { AssetEntry } from "./asset_entry.js";
+import { readJson } from "./json.js";
 import { readImages, readMaterials } from "./materials.js";
 import { readTimes } from "./times.js";
 
 const MAX_PARTS = 2 ** 22;
 const MAX_COMPONENTS = 64;
-const PER_CHARACTER = 32; // bytes of memory, of JSON
 const HUGE = 3.5e38; // above float32's largest number
 export const KINDS = ["uv", "normal", "tangent", "color", "scalar", "vector", "label"];
 export const DOMAINS = ["vertex", "corner", "triangle", "part"];
@@ -48,6 +48,7 @@ export const NO_ASSET = {
   materials: [],
   images: [],
   polygons: null,
+  volume: null,
   metadata: {},
   notes: [],
   close() {},
@@ -71,12 +72,19 @@ export async function readAsset(payload, video, positions) {
   const { parts, indices, polygons } = readParts(kernels, list, payload, video, materials.length);
   const first = list.flag("geometry", false) ? await video.frame(0) : null;
   const attributes = readAttributes(list, payload, new Surface(kernels, indices, video.vertexCount, first, parts.length), notes);
-  const host = new FieldHost(code, Int32Array.from(indices), video.vertexCount, polygons, positions);
+  const faces = Int32Array.from(indices);
+  const host = new FieldHost(code, faces, video.vertexCount, polygons, positions);
   const { frameCount, vertexCount, triangleCount } = video;
   const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, polygons, host }, notes);
   const metadata = await readMetadata(list, payload);
-  const close = () => host.close();
-  return { indices, parts, attributes, fields, materials, images, polygons, metadata, notes, close };
+  const surface = { code, faces, vertexCount, polygons, frameCount };
+  const volume = hasVolume(payload) ? await readVolume(payload, surface) : null;
+  if (!volume && hasVolume(payload)) notes.push("what lies inside is not shown: a newer gvpipe wrote it");
+  const close = () => {
+    host.close();
+    volume?.close();
+  };
+  return { indices, parts, attributes, fields, materials, images, polygons, volume, metadata, notes, close };
 }
 
 /** What a coarser level of detail has of an asset: its metadata. @returns {Promise<typeof NO_ASSET>} @throws {GeometryVideoError} */
@@ -96,18 +104,8 @@ async function readMetadata(list, payload) {
 /** The list of what an asset has; null if a file has none, or one of a newer gvpipe. */
 async function readList(payload) {
   if (!payload.sections.has(SECTION)) return null;
-  const list = new AssetEntry(await readJson(payload.section(SECTION), payload.budget), "the list");
+  const list = new AssetEntry(await readJson(payload.section(SECTION), payload.budget, MAX_BYTES, SECTION), "the list");
   return list.integer("version", undefined, 1, 2 ** 31) > VERSION ? null : list;
-}
-
-async function readJson(data, budget) {
-  const most = Math.min(MAX_BYTES, Math.floor(budget.left / PER_CHARACTER));
-  const text = await inflate(data, most, (what) => corrupt(SECTION, what));
-  try {
-    return JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(text));
-  } catch {
-    throw corrupt(SECTION, "it is not JSON");
-  }
 }
 
 function readParts(kernels, list, payload, { indices: decoded, vertexCount }, nMaterials) {

@@ -78,12 +78,15 @@ export class CodedField {
     return true;
   }
 
+  /** Frame k (R, C), if it is in memory, else null: not copied, of use until the next call. */
+  values(k) {
+    const segment = this.#head && this.#segments.get(this.#numberOf(k));
+    return segment ? this.#frameOf(segment, k, this.#numberOf(k)) : null;
+  }
+
   /** The numbers of a row in frame k, if it is in memory, else null. @returns {Float32Array|null} */
   row(k, row) {
-    const segment = this.#head && this.#segments.get(this.#numberOf(k));
-    if (!segment) return null;
-    const start = row * this.components;
-    return this.#frameOf(segment, k, this.#numberOf(k)).subarray(start, start + this.components);
+    return this.values(k)?.subarray(row * this.components, (row + 1) * this.components) ?? null;
   }
 
   /** A promise that frame k is in memory. */

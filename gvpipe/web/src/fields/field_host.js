@@ -15,9 +15,10 @@ export class FieldHost {
    * @param {Uint8Array} code of kernels @param {Int32Array} faces (3T) @param {number} vertexCount
    * @param {Int32Array|null} polygons corners of each, if not all are triangles
    * @param {(frame: number) => Promise<Float32Array>} positions (V, 3) decoded
+   * @param {object|null} volume what `openGrid` takes, of fields whose rows lie inside
    */
-  constructor(code, faces, vertexCount, polygons, positions) {
-    this.mesh = { task: "fields", code, faces, vertexCount, polygons };
+  constructor(code, faces, vertexCount, polygons, positions, volume = null) {
+    this.mesh = { task: "fields", code, faces, vertexCount, polygons, volume };
     this.positions = positions;
   }
 

@@ -25,7 +25,7 @@ async function decode(decoder, waiting, number, job) {
     });
   try {
     const values = await decoder.decode(job, positionsOf);
-    self.postMessage({ number, values }, [values.buffer]);
+    self.postMessage({ number, values }, values.buffer ? [values.buffer] : []);
   } catch (error) {
     const { kind = "unsupported", message } = known(error, job.name);
     self.postMessage({ number, error: { kind, message } });

@@ -125,6 +125,8 @@ export async function readHeader(sections) {
   }
   for (const [key, [low, high]] of Object.entries(LIMITS)) checkInteger(header ?? {}, key, low, high);
   checkNumber(header, "fps", Number.MIN_VALUE, 100_000);
+  const { origin = [0, 0, 0] } = header;
+  if (!(Array.isArray(origin) && origin.length === 3 && origin.every(Number.isFinite))) throw wrong("its origin is no point");
   if (typeof header.codec !== "string" || !isObject(header.settings) || !isObject(header.container)) {
     throw wrong("it is not as gvpipe writes it");
   }

@@ -1,6 +1,7 @@
 /** Requests to web servers, which end when nothing comes for a while, or when what asked for them is closed. */
 
 import { GeometryVideoError } from "./errors.js";
+import { answer, isRangeSource } from "./range_source.js";
 
 /** How long an answer may take: seconds without a byte, seconds in all, and the bytes per second of long ones, which may take longer. */
 export const TIMES = { silence: 30, least: 60, rate: 1e4 };
@@ -16,7 +17,7 @@ export function closed() {
 }
 
 /**
- * @param {string|URL} url
+ * @param {string|URL|import("./range_source.js").RangeSource} url a range source may be silent for as long as it likes, as busy kernels are
  * @param {AbortSignal} signal ends it
  * @param {{what?: string, remedy?: string, init?: RequestInit, most?: number}} [options] `what` is asked for, and what helps if it does not
  *   come: for messages; `most` bytes are taken of the answer
@@ -25,7 +26,7 @@ export function closed() {
  * @throws {GeometryVideoError} kind "load": the connection fails; of `read` and `bytes`, too
  * @throws {unknown} the signal's reason
  */
-export async function request(url, signal, { what = String(url), remedy = "try again", init = {}, most = MOST } = {}) {
+export async function request(url, signal, { what = nameOf(url), remedy = "try again", init = {}, most = MOST } = {}) {
   const own = new AbortController();
   const follow = () => own.abort(signal.reason);
   const end = () => signal.removeEventListener("abort", follow);
@@ -34,12 +35,14 @@ export async function request(url, signal, { what = String(url), remedy = "try a
 
   let waited = 0; // ms, in all
   let taken = 0; // bytes of the body
+  const isPatient = isRangeSource(url);
   async function watched(promise) {
     const begun = performance.now();
     const left = 1000 * (TIMES.least + taken / TIMES.rate) - waited;
     const silent = 1000 * TIMES.silence <= left;
     const why = silent ? `nothing came for ${TIMES.silence} s` : `it comes too slowly`;
-    const timer = setTimeout(() => own.abort(new Error(why)), Math.max(0, Math.min(1000 * TIMES.silence, left)));
+    const limit = Math.max(0, Math.min(1000 * TIMES.silence, left));
+    const timer = isPatient ? 0 : setTimeout(() => own.abort(new Error(why)), limit);
     try {
       const result = await promise;
       waited += performance.now() - begun;
@@ -53,7 +56,8 @@ export async function request(url, signal, { what = String(url), remedy = "try a
     }
   }
 
-  const response = await watched(fetch(url, { ...init, signal: own.signal }));
+  const asked = { ...init, signal: own.signal };
+  const response = await watched(isPatient ? answer(url, asked) : fetch(url, asked));
   let body = null;
   async function read() {
     body ??= response.body?.getReader();
@@ -91,6 +95,11 @@ export async function request(url, signal, { what = String(url), remedy = "try a
     return Object.assign(error, { status: response.status });
   }
   return { response, read, bytes, close, refused };
+}
+
+/** What messages call a file. @param {string|URL|import("./range_source.js").RangeSource} source */
+export function nameOf(source) {
+  return isRangeSource(source) ? source.name : String(source);
 }
 
 /** Bytes one after the other. @param {Uint8Array[]} parts @returns {Uint8Array} */

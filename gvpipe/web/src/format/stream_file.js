@@ -12,7 +12,7 @@ import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { Incoming } from "./incoming.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
 import { clipName, readHeader } from "./payload.js";
-import { joined, request } from "./request.js";
+import { joined, nameOf, request } from "./request.js";
 import { checkHead, OF_COMPANIONS, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
@@ -28,7 +28,7 @@ const LOOKS = 120;
 
 export class StreamFile {
   /**
-   * @param {string|URL} url @param {AbortSignal} signal ends its requests
+   * @param {string|URL|import("./range_source.js").RangeSource} url @param {AbortSignal} signal ends its requests
    * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout, where nothing belongs to segments, and
    *   of pictures where there is no WebCodecs; null where the server refuses a part
    * @throws {GeometryVideoError} it cannot be fetched, or the index is damaged
@@ -57,13 +57,13 @@ export class StreamFile {
   /** A file that is still written, once a clip is there. @param {number} place behind the room for the index */
   static async #openLive(url, signal, received, place, incoming) {
     incoming?.close();
-    if (incoming) throw new GeometryVideoError("load", `${url} is still written, and its server knows no Range; try again when it is finished`);
+    if (incoming) throw new GeometryVideoError("load", `${nameOf(url)} is still written, and its server knows no Range; try again when it is finished`);
     const file = new StreamFile(url, signal, received, null);
     for (let i = 0; i < LOOKS; i++) {
       if (await file.#beginLive(place)) return file;
       await new Promise((resolve) => setTimeout(resolve, LOOK_AGAIN));
     }
-    throw new GeometryVideoError("load", `${url} is still written, and nothing comes; try again`);
+    throw new GeometryVideoError("load", `${nameOf(url)} is still written, and nothing comes; try again`);
   }
 
   constructor(url, signal, received, incoming) {
@@ -297,7 +297,7 @@ export class StreamFile {
   /** @param {boolean} [mayEnd] whether the file may end before */
   async #fetch(offset, length, mayEnd = false) {
     if (offset + length <= this.start?.length) return this.start.subarray(offset, offset + length);
-    const wanted = `bytes ${offset} to ${offset + length - 1} of ${this.url}`;
+    const wanted = `bytes ${offset} to ${offset + length - 1} of ${nameOf(this.url)}`;
     if (this.incoming) return this.#await(offset, length, wanted);
     const init = { cache: this.live ? "no-store" : "default", headers: { Range: `bytes=${offset}-${offset + length - 1}` } };
     const asked = await request(this.url, this.signal, { what: wanted, init, most: length });
@@ -311,7 +311,7 @@ export class StreamFile {
   }
 
   #isAnother() {
-    return new GeometryVideoError("corrupt", `${this.url} has another file by now; load the page again`);
+    return new GeometryVideoError("corrupt", `${nameOf(this.url)} has another file by now; load the page again`);
   }
 
   async #await(offset, length, wanted) {

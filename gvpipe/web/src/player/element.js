@@ -5,11 +5,13 @@
  * those who prefer reduced motion), `loop`, `wireframe`, `follow` (the camera goes with the mesh), `speed` (1 is the video's
  * own), `up` ("y", or "z"), `field` (the name of one that is shown in colours), `colormap`, `range` ("low,high" of the colours),
  * `scale` ("log": colours follow the logarithm), `warp` ("name:scale" of a field that moves vertices), `camera`
- * ("azimuth,elevation" of the first view, degrees), `shading` ("flat": each triangle has one normal),
+ * ("azimuth,elevation" of the first view, degrees), `clip` ("x=0.3", "y=30%" or "-x=0.3": a plane that cuts the mesh), `shading` ("flat": each triangle has one normal),
  * `lod` (a level of detail, or "auto": a coarser one where the page cannot keep up), `muted`, `volume` (0 to 1).
  * Frames follow the sound's clock while it is heard. Browsers let a page play on its own only if it is `muted`.
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
- * the frame's number), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on); `error` has a `GeometryVideoError` as its detail.
+ * the frame's number), `viewchange` (detail: azimuth and elevation that a user turned to), `partschange` (detail: names of
+ * hidden parts), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on),
+ * `clip` (detail: the cut that is shown, or null); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
@@ -19,6 +21,7 @@ import { FASTEST, SLOWEST, checkRate } from "../playback_rate.js";
 import { COLORMAPS } from "../three/colormaps.js";
 import { isLogarithmic } from "../three/field_colours.js";
 import { parseWarp, usualMover } from "../three/warp.js";
+import { cutText, parseCut } from "../volume/plane.js";
 import { Bar, nextSpeed } from "./bar.js";
 import { listenToClicks } from "./clicks.js";
 import { embedded } from "./embedded.js";
@@ -50,7 +53,8 @@ const MEDIA_EVENTS = ["play", "playing", "pause", "seeking", "seeked", "timeupda
 const SOUND_ATTRIBUTES = ["muted", "volume"];
 
 const FIELD_ATTRIBUTES = ["field", "colormap", "range", "scale"];
-const VIEW_ATTRIBUTES = ["warp", "camera", "shading"];
+const VIEW_ATTRIBUTES = ["warp", "clip", "camera", "shading"];
+const HOLLOW = "the cut is hollow: the file has no volume (gvpipe encode --volume)";
 const MOST_SHARE = 0.25; // of the diagonal, that the slider's end moves vertices by
 
 /** Where there are no pages, modules that name the element can still be loaded. */
@@ -67,6 +71,7 @@ export class GeometryVideoElement extends Base {
   #probe;
   #loading = null; // Load
   #loaded = null; // promise, while a file is loaded
+  #given = null; // what was loaded last, as it was given
   #wanted = null; // what was asked for last, of a file that may still load: true, to play; false, to pause
   #isReady = false; // whether a file is loaded, and said to be
   #giveUps = new Set(); // reject what waits for that to play
@@ -75,6 +80,7 @@ export class GeometryVideoElement extends Base {
   #sought = null; // a promise that it is shown
   #resume = false; // whether to play on when the slider is let go
   #showing = null; // counts changes of the field
+  #cutting = null; // and of the cut
   #hidden = new Set(); // names of parts
 
   /** The `GeometryVideo` that is shown, or null. */
@@ -100,7 +106,11 @@ export class GeometryVideoElement extends Base {
       field: (name) => (name ? this.setAttribute("field", name) : this.removeAttribute("field")),
       colormap: (name) => this.setAttribute("colormap", name),
       warp: (name, scale) => this.setAttribute("warp", `${name}:${scale}`),
-      hide: (names) => this.hide(names),
+      clip: (change) => this.#changeClip(change),
+      hide: (names) => {
+        this.hide(names);
+        this.#tell("partschange", [...names]);
+      },
     });
     this.#legend = new Legend(root.querySelector(".legend"));
     this.#probe = new Probe(root.querySelector(".probe"), (vertex) => this.#stage?.setMark(vertex));
@@ -112,7 +122,8 @@ export class GeometryVideoElement extends Base {
   }
 
   connectedCallback() {
-    if (this.hasAttribute("src") && !this.#loaded) this.load(this.getAttribute("src"));
+    const source = this.#given ?? this.getAttribute("src");
+    if (source !== null && !this.#loaded) this.load(source); // anew, where it was taken out of the page
   }
 
   disconnectedCallback() {
@@ -135,7 +146,8 @@ export class GeometryVideoElement extends Base {
   }
 
   attributeChangedCallback(name, before, value) {
-    if (name === "src" && this.isConnected && value !== null && (before !== value || this.error)) this.load(value);
+    if (name === "src" && !this.isConnected) this.#given = null;
+    else if (name === "src" && value !== null && (before !== value || this.error)) this.load(value);
     if (["loop", "wireframe", "follow"].includes(name)) this.#bar.setPressed(name, value !== null);
     if (name === "wireframe") this.#stage?.setWireframe(value !== null);
     if (name === "follow") this.#stage?.setFollowing(value !== null);
@@ -308,6 +320,26 @@ export class GeometryVideoElement extends Base {
     return numbers.length === 2 && numbers.every(Number.isFinite) && Math.abs(numbers[1]) <= 90 ? numbers : null;
   }
 
+  /** The plane of attribute `clip` (`volume/plane.js`), or null. */
+  get clip() {
+    return parseCut(this.getAttribute("clip"));
+  }
+
+  /** (n, 3, 3) corners of the triangles of the cut's section, model units, the file's origin apart; empty where it is hollow. */
+  get section() {
+    return this.#mesh?.section ?? new Float32Array(0);
+  }
+
+  /** Azimuth and elevation of the view as it is, degrees; null while nothing is loaded. */
+  get view() {
+    return this.#mesh ? this.#stage.angles : null;
+  }
+
+  /** Turn the camera about the middle of the picture. @param {number} azimuth @param {number} elevation degrees */
+  turnTo(azimuth, elevation) {
+    if (this.#mesh) this.#stage.turnTo([azimuth, elevation]);
+  }
+
   /** Names of the parts that are hidden. */
   get hiddenParts() {
     return new Set(this.#hidden);
@@ -329,6 +361,7 @@ export class GeometryVideoElement extends Base {
   /** Load and show a file: an address, `#id`, or the file itself; without one, `src` anew. Errors are shown in the element. */
   load(source = this.src) {
     this.#unload();
+    this.#given = source;
     this.currentSrc = typeof source === "string" || source instanceof URL ? String(source) : "";
     let end;
     this.#loaded = new Promise((resolve) => (end = resolve)); // there before any listener is told
@@ -365,6 +398,7 @@ export class GeometryVideoElement extends Base {
       this.#openMesh();
       await load.step(breathe());
       await load.step(Promise.all([this.#showField(), this.#showWarp()]));
+      this.#showClip(); // what lies inside may come later
       this.#becomeReady(load);
     } catch (error) {
       loaded?.then((late) => late.close(), () => {});
@@ -399,7 +433,10 @@ export class GeometryVideoElement extends Base {
     const canvas = this.shadowRoot.querySelector("canvas");
     canvas.addEventListener("webglcontextlost", () => this.#stage?.hasMesh && this.#say(LOST, "alert"));
     canvas.addEventListener("webglcontextrestored", () => this.#say(""));
-    return openStage(canvas);
+    const stage = openStage(canvas);
+    stage.cutMoved = (place) => this.#changeClip({ place });
+    stage.turned = () => this.#tell("viewchange", stage.angles);
+    return stage;
   }
 
   #openMesh() {
@@ -435,6 +472,7 @@ export class GeometryVideoElement extends Base {
       if (level === 0) {
         this.#showField();
         this.#showWarp();
+        this.#showClip();
       }
       this.#tell("levelchange", level);
     });
@@ -539,7 +577,42 @@ export class GeometryVideoElement extends Base {
   #showView(name) {
     if (name === "camera") this.#stage.setView(this.camera);
     else if (name === "shading") this.#stage.setFlatShading(this.getAttribute("shading") === "flat");
+    else if (name === "clip") this.#showClip();
     else this.#showWarp();
+  }
+
+  /** Cut the mesh by the plane of attribute `clip`, if it is one: a promise that the section is shown. */
+  async #showClip() {
+    const { video, clip } = this;
+    if (!this.#mesh || (!clip && !this.#mesh.cut)) return;
+    const showing = (this.#cutting = {});
+    const isFirst = clip && video.volume && !video.volume.grid;
+    if (isFirst) this.#say("Decoding what lies inside …");
+    try {
+      const cutting = this.#stage.setClip(clip);
+      this.#panel.setClip(this.#stage.cutRange);
+      this.#bar.setNotes([...this.#mesh.notes, ...(clip && !video.volume && !video.level ? [HOLLOW] : [])]);
+      if (!(await cutting) || showing !== this.#cutting) return;
+      this.#tell("clip", clip);
+    } catch (error) {
+      if (video === this.video) this.#interrupt(error);
+      return;
+    }
+    if (isFirst && showing === this.#cutting) this.#say("");
+  }
+
+  #changeClip({ axis, place, turn }) {
+    const cut = this.#stage.cutRange;
+    if (axis === null) {
+      this.removeAttribute("clip");
+    } else if (axis !== undefined) {
+      const { min, max } = this.#mesh.bounds;
+      const middle = (min[axis] + max[axis]) / 2 + this.video.origin[axis];
+      this.setAttribute("clip", cutText({ axis, place: middle, isPart: false, sign: this.clip?.sign ?? 1 }));
+    } else if (cut) {
+      const sign = turn ? -this.clip.sign : this.clip.sign;
+      this.setAttribute("clip", cutText({ axis: cut.axis, place: place ?? cut.place, isPart: false, sign }));
+    }
   }
 
   /** Move vertices by the field of attribute `warp`, if the video has it; offer what else can move them. */
@@ -666,7 +739,7 @@ export class GeometryVideoElement extends Base {
     this.#loaded = null;
     this.#loading?.end();
     this.#loading = null;
-    this.#showing = null;
+    this.#showing = this.#cutting = null;
     this.video?.close();
     this.video = null;
     this.error = null;

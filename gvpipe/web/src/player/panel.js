@@ -1,9 +1,11 @@
 /**
- * Menus over the picture: the field that is shown and its colour map, how far a field moves the mesh, and the parts that are shown.
+ * Menus over the picture: the field that is shown and its colour map, how far a field moves the mesh, where a plane cuts it, and the
+ * parts that are shown.
  * They are there if there is a choice.
  */
 
 import { COLORMAPS } from "../three/colormaps.js";
+import { AXES } from "../volume/plane.js";
 
 const MANY = 12; // parts from which on they can be searched
 const MOST_LISTED = 200;
@@ -13,6 +15,10 @@ const MARKUP = `
   <label class="choice" hidden><span>Colours</span> <select data-of="colormap" aria-label="Colour map"></select></label>
   <div class="choice warp" hidden>
     <span></span> <input type="range" aria-label="Scale of the displacement"> <input type="number" step="any" aria-label="Scale of the displacement">
+  </div>
+  <div class="choice clip" role="group" aria-label="Cut" hidden>
+    <span>Cut</span> ${[...AXES].map((axis) => `<button type="button" aria-pressed="false" title="Cut across ${axis}">${axis}</button>`).join("")}
+    <input type="range" aria-label="Place of the cut" hidden> <button type="button" title="The other half" aria-label="The other half" hidden>⇄</button>
   </div>
   <details class="choice" hidden>
     <summary>Parts</summary>
@@ -25,7 +31,8 @@ export class Panel {
   /**
    * @param {HTMLElement} root filled with the menus
    * @param {{field: (name: string) => void, colormap: (name: string) => void, warp: (name: string, scale: number) => void,
-   *   hide: (names: Set<string>) => void}} on called for what the user asks for; field "" is the materials
+   *   clip: (change: {axis?: number|null, place?: number, turn?: boolean}) => void, hide: (names: Set<string>) => void}} on called for what
+   *   the user asks for; field "" is the materials; axis null: no cut
    */
   constructor(root, on) {
     root.innerHTML = MARKUP;
@@ -36,6 +43,10 @@ export class Panel {
     this.filter = root.querySelector("input[type=search]");
     this.warp = root.querySelector(".warp");
     [this.warpName, this.slider, this.scale] = this.warp.children;
+    this.clip = root.querySelector(".clip");
+    this.axes = [...this.clip.querySelectorAll("[aria-pressed]")];
+    this.cutPlace = this.clip.querySelector("input");
+    this.turn = this.clip.lastElementChild;
     this.list = root.querySelector("ul");
     this.more = root.querySelector("p");
     this.names = [];
@@ -46,6 +57,9 @@ export class Panel {
     for (const input of [this.slider, this.scale]) {
       input.addEventListener("input", () => Number.isFinite(input.valueAsNumber) && on.warp(this.mover, input.valueAsNumber));
     }
+    this.axes.forEach((button, axis) => button.addEventListener("click", () => on.clip({ axis: button.ariaPressed === "true" ? null : axis })));
+    this.cutPlace.addEventListener("input", () => on.clip({ place: this.cutPlace.valueAsNumber }));
+    this.turn.addEventListener("click", () => on.clip({ turn: true }));
     this.filter.addEventListener("input", () => this.#listParts());
     this.list.addEventListener("change", ({ target }) => this.#toggle(this.names[target.value], target.checked));
   }
@@ -58,6 +72,7 @@ export class Panel {
     this.fields.parentElement.hidden = !shown.length;
     this.names = parts;
     this.hidden = new Set();
+    this.clip.hidden = !video.volume;
     this.parts.hidden = parts.length < 2;
     this.parts.open = false;
     this.filter.hidden = parts.length < MANY;
@@ -93,6 +108,18 @@ export class Panel {
     this.warpName.textContent = `Move by ${name} ×`;
     this.slider.value = scale;
     if (this.scale.valueAsNumber !== scale) this.scale.value = Number(scale.toPrecision(6));
+  }
+
+  /** @param {{axis: number, low: number, high: number, place: number}|null} range where a cut is and can be; null: there is none */
+  setClip(range) {
+    if (range) this.clip.hidden = false;
+    this.axes.forEach((button, axis) => (button.ariaPressed = String(axis === range?.axis)));
+    this.cutPlace.hidden = this.turn.hidden = !range;
+    if (!range) return;
+    const { low, high, place } = range;
+    const [min, max] = [Math.min(low, place), Math.max(high, place)];
+    Object.assign(this.cutPlace, { min, max, step: (max - min) / 1000 || 1 });
+    this.cutPlace.value = place;
   }
 
   /** @param {Set<string>} names */

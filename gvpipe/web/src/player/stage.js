@@ -20,6 +20,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
 import { GeometryVideoMesh } from "../three/geometry_video_mesh.js";
+import { CutHandle } from "./cut_handle.js";
 
 const FIELD_OF_VIEW = 35; // degrees, of the shorter side
 const FAR = 100; // balls that the motion fits in, at least
@@ -41,6 +42,7 @@ export class Stage {
     this.hasGpu = probeGpu();
     // without a GPU smooth edges would cost more than all else together
     this.renderer = new WebGLRenderer({ canvas, antialias: this.hasGpu, alpha: true });
+    this.renderer.localClippingEnabled = true;
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, FAR);
     this.scene.add(this.camera);
@@ -48,8 +50,14 @@ export class Stage {
     key.position.set(-1.2, 1.6, 1); // light goes with the camera, so that nothing looked at is dark
     this.camera.add(key, key.target);
     this.scene.add(new HemisphereLight(0xffffff, 0x8c8a88, 1.4));
+    this.handle = new CutHandle(canvas, this.camera, (place) => this.cutMoved(this.#modelPlace(place))); // hears of pointers first
+    this.scene.add(this.handle);
+    this.cutMoved = () => {}; // called with where the cut is dragged to, model units
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", () => this.requestRender());
+    this.controls.addEventListener("change", () => {
+      this.requestRender();
+      if (!this.isFramed) this.turned();
+    });
     this.controls.addEventListener("start", () => (this.isFramed = false));
     this.isFollowing = false; // whether the camera goes where the mesh goes
     this.isFramed = false; // whether the view is still the first one, which follows the picture's shape
@@ -60,6 +68,7 @@ export class Stage {
     this.mark.geometry.setAttribute("position", new BufferAttribute(new Float32Array(3), 3));
     Object.assign(this.mark, { visible: false, frustumCulled: false, renderOrder: 1 });
     this.scene.add(this.mark);
+    this.turned = () => {}; // called when a user turns the camera
     this.turn = 0; // counts meshes, so that a late one does not replace its successor
     this.pending = 0;
     this.size = ""; // of the picture, as it is
@@ -114,6 +123,21 @@ export class Stage {
     this.requestRender();
   }
 
+  /** Azimuth and elevation of the view as it is, degrees, as of `gvpipe.render`. */
+  get angles() {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const { x, y, z } = offset;
+    const [rise, turn] = this.camera.up.z ? [z, Math.atan2(x, -y)] : [y, Math.atan2(x, z)];
+    return [turn, Math.asin(rise / (offset.length() || 1))].map((angle) => (angle * 180) / Math.PI);
+  }
+
+  /** Turn the camera about its target, from where it is. @param {[number, number]} view azimuth and elevation, degrees */
+  turnTo(view) {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    this.camera.position.copy(this.#direction(view)).multiplyScalar(distance).add(this.controls.target);
+    this.#moved();
+  }
+
   /** Where the first view looks from. @param {[number, number]|null} view azimuth and elevation, degrees, as of `gvpipe.render` */
   setView(view) {
     this.view = view ?? VIEW;
@@ -124,6 +148,37 @@ export class Stage {
   async setWarp(name, scale) {
     const { mesh } = this;
     if ((await mesh.setWarp(name, scale)) && mesh === this.mesh) this.#frameShown();
+  }
+
+  /** Cut by a plane (`GeometryVideoMesh.setClip`). */
+  async setClip(cut) {
+    const { mesh } = this;
+    const cutting = mesh.setClip(cut);
+    this.#showHandle();
+    try {
+      return await cutting;
+    } finally {
+      if (mesh === this.mesh) this.requestRender();
+    }
+  }
+
+  /** `{axis, low, high, place}`: where a cut can be along its axis, and where it is, model units; null if there is none. */
+  get cutRange() {
+    const { cut } = this.mesh;
+    if (!cut) return null;
+    const { min, max } = this.#motion();
+    const [low, high, place] = [min.getComponent(cut.axis), max.getComponent(cut.axis), cut.place].map((value) => this.#modelPlace(value, cut.axis));
+    return { axis: cut.axis, low, high, place };
+  }
+
+  /** A place along an axis in model units, of one in the scene. */
+  #modelPlace(place, axis = this.mesh.cut.axis) {
+    return place / this.scale + this.centre[axis] + this.mesh.video.origin[axis];
+  }
+
+  #showHandle() {
+    this.handle.show(this.mesh.cut, this.#motion());
+    this.requestRender();
   }
 
   /** What is seen at a point of the picture (`GeometryVideoMesh.pick`). @param {number} x @param {number} y CSS pixels, from its upper left */
@@ -166,13 +221,7 @@ export class Stage {
 
   /** Look from where the first view does at the whole motion, or at the mesh that is followed. */
   resetView() {
-    const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
-    const front = new Vector3(...upright.slice(0, 3));
-    const up = new Vector3(...upright.slice(3));
-    const [azimuth, steep] = this.view;
-    const [turn, rise] = [azimuth, Math.min(STEEPEST, Math.max(-STEEPEST, steep))].map((degrees) => (degrees * Math.PI) / 180);
-    const direction = front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise));
-    direction.applyAxisAngle(up, turn);
+    const direction = this.#direction(this.view);
     this.box = this.#motion();
     this.middle = this.isFollowing ? this.#findMiddle() : this.box.getCenter(new Vector3());
     const half = this.isFollowing ? this.#findReach(this.middle) : this.box.getSize(new Vector3()).divideScalar(2).toArray();
@@ -214,8 +263,10 @@ export class Stage {
   /** The picture drawn anew, without a mark, as a promise of a PNG file. */
   still() {
     this.mark.visible = false;
+    this.handle.isDrawn = false;
     this.renderer.render(this.scene, this.camera); // what was drawn before is gone once it is on the screen
     const picture = new Promise((resolve) => this.renderer.domElement.toBlob(resolve, "image/png"));
+    this.handle.isDrawn = true;
     this.setMark(this.marked);
     return picture;
   }
@@ -227,6 +278,7 @@ export class Stage {
     }
     this.mesh = this.marked = null;
     this.mark.visible = false;
+    this.handle.show(null);
     this.isFramed = false;
     this.requestRender();
   }
@@ -237,6 +289,7 @@ export class Stage {
     cancelAnimationFrame(this.pending);
     this.observer.disconnect();
     this.controls.dispose();
+    this.handle.dispose();
     this.reflected?.dispose();
     this.mark.geometry.dispose();
     this.mark.material.dispose();
@@ -260,6 +313,15 @@ export class Stage {
     const { min, max } = this.mesh.bounds;
     const [low, high] = [min, max].map((corner) => new Vector3(...corner.map((value, axis) => (value - centre[axis]) * scale)));
     return new Box3(low, high);
+  }
+
+  /** Of unit length, from the target to the camera. @param {[number, number]} view azimuth and elevation, degrees */
+  #direction([azimuth, steep]) {
+    const upright = this.camera.up.z ? [0, -1, 0, 0, 0, 1] : [0, 0, 1, 0, 1, 0];
+    const front = new Vector3(...upright.slice(0, 3));
+    const up = new Vector3(...upright.slice(3));
+    const [turn, rise] = [azimuth, Math.min(STEEPEST, Math.max(-STEEPEST, steep))].map((degrees) => (degrees * Math.PI) / 180);
+    return front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise)).applyAxisAngle(up, turn);
   }
 
   #findUsed() {
@@ -289,6 +351,7 @@ export class Stage {
   }
 
   #frameShown() {
+    if (this.mesh.cut) this.#showHandle(); // the box may have grown
     if (this.isFollowing) this.#follow(this.#findMiddle());
     else if (this.isFramed && !this.box.containsBox(this.#motion())) this.resetView(); // the motion goes farther than was known
     this.setMark(this.marked);

@@ -16,7 +16,7 @@ import { OFFSET } from "./materials.js";
 import { toLinear } from "./vertex_attributes.js";
 
 const UV_CHANNEL = 3; // the last of three.js's uv sets; materials have the others
-const UV_NAME = `uv${UV_CHANNEL}`;
+export const UV_NAME = `uv${UV_CHANNEL}`;
 const HOLE_ROW = 1; // v of vertices without a value; 0 for the others
 const ROWS = 16; // of pixels of the texture
 
@@ -56,25 +56,20 @@ export class FieldColours {
     return true;
   }
 
-  #place(lowest, highest, isLog) {
-    const [low, high] = isLog ? [Math.log(lowest), Math.log(highest)] : [lowest, highest];
+  #place(low, high, isLog) {
     const { values, rows, table } = this;
     const { components } = this.field;
     const { array } = this.attribute;
-    const scale = high > low ? 1 / (high - low) : 0;
-    const offset = high > low ? 0 : 0.5;
+    const part = partsOf([low, high], isLog);
     for (let r = 0; r < rows.length; r++) {
       let value = values[rows[r] * components];
       if (components > 1) value = length(values, rows[r] * components, components);
-      if (isLog) value = value > 0 ? Math.log(value) : NaN;
-      const isHole = value !== value; // NaN
-      const place = Math.min(1, Math.max(0, (value - low) * scale + offset));
+      const found = part(value);
       if (table) {
-        const colour = isHole ? 3 * SIZE : 3 * Math.round(place * (SIZE - 1));
+        const colour = found !== found ? 3 * SIZE : 3 * Math.round(within(found) * (SIZE - 1)); // NaN
         for (let i = 0; i < 3; i++) array[3 * r + i] = table[colour + i];
       } else {
-        array[2 * r] = isHole ? 0 : place * (1 - 1 / SIZE) + 0.5 / SIZE; // middles of pixels
-        array[2 * r + 1] = isHole ? HOLE_ROW : 0;
+        placeInMap(array, r, found);
       }
     }
   }
@@ -91,6 +86,28 @@ export class FieldColours {
       }
     }
   }
+}
+
+/** What part of a range a value has reached, as a function of the value; NaN for what has no colour. */
+export function partsOf([lowest, highest], isLog) {
+  const [low, high] = isLog ? [Math.log(lowest), Math.log(highest)] : [lowest, highest];
+  const scale = high > low ? 1 / (high - low) : 0;
+  const offset = high > low ? 0 : 0.5;
+  return (given) => {
+    const value = !isLog ? given : given > 0 ? Math.log(given) : NaN;
+    return (value - low) * scale + offset;
+  };
+}
+
+/** Where a vertex's part of the range is in the texture of a colour map. @param {Float32Array} array (R, 2) @param {number} r */
+export function placeInMap(array, r, part) {
+  const isHole = part !== part; // NaN
+  array[2 * r] = isHole ? 0 : within(part) * (1 - 1 / SIZE) + 0.5 / SIZE; // middles of pixels
+  array[2 * r + 1] = isHole ? HOLE_ROW : 0;
+}
+
+function within(part) {
+  return Math.min(1, Math.max(0, part));
 }
 
 /** (SIZE + 1, 3): the colour map and the colour of holes as linear light, for vertices of their own. */

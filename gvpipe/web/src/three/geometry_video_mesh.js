@@ -15,13 +15,16 @@ import {
   LineBasicMaterial,
   LineSegments,
   Mesh,
+  Plane,
   Points,
   PointsMaterial,
   Sphere,
   Vector3,
 } from "three";
+import { stretch } from "../format/points.js";
 import { Playback, checkSeconds } from "../playback.js";
 import { FieldColours, fieldMaterial, isLogarithmic, linearTable, rangeOf } from "./field_colours.js";
+import { FilledCut } from "./filled_cut.js";
 import { makeMaterial, plainMaterial } from "./materials.js";
 import { Normals, groupCorners, groupVertices } from "./normals.js";
 import { PartIndex } from "./part_index.js";
@@ -79,6 +82,10 @@ export class GeometryVideoMesh extends Mesh {
   #warp = null; // Warp
   #wantedWarp = { field: null, scale: 1 }; // shown, or to be shown once its field is loaded
   #unmoved = null; // (V, 3) the frame shown, in the geometry's units, before the warp moved it
+  #wantedCut = null; // shown, or to be shown once the volume is here
+  #plane = null; // of the cut: three.js's, in the scene
+  #fill = null; // FilledCut
+  #firstBox = null; // of the first frame shown, model units
   #isFlat = false; // whether each triangle has one normal
   #drawn = this; // what the materials are of: the mesh, or points
   #wires = null;
@@ -99,7 +106,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#open(positions, new Set());
     const on = {
       show: (shown, k) => this.#show(shown, k),
-      prepare: (k) => (video.level ? undefined : Promise.all([this.#wanted.field?.load(k), this.#wantedWarp.field?.load(k)])),
+      prepare: (k) => (video.level ? undefined : Promise.all([this.#wanted.field?.load(k), this.#wantedWarp.field?.load(k), this.#fill?.load(k, this.#warp)])),
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
       silent: () => {
@@ -266,6 +273,64 @@ export class GeometryVideoMesh extends Mesh {
     return true;
   }
 
+  /**
+   * Leave out what lies on one side of a plane across an axis; the section of a volume is filled. The renderer needs
+   * `localClippingEnabled`.
+   *
+   * @param {import("../volume/plane.js").Cut|null} cut model units, the file's origin included; null: nothing is left out
+   * @returns {Promise<boolean>} whether it is shown; false if another call came since
+   */
+  async setClip(cut) {
+    const wanted = (this.#wantedCut = cut);
+    this.#plane = cut && (this.#plane ?? new Plane());
+    this.updateMatrixWorld(true);
+    for (const material of [this.#materials, this.#drawn.material, this.#wires?.material ?? []].flat()) this.#shade(material);
+    if (this.#fill) this.#showFill(this.currentFrame);
+    const { volume } = this.video;
+    if (!cut || !volume) {
+      this.#closeFill();
+      return true;
+    }
+    await volume.open();
+    if (wanted !== this.#wantedCut || this.video.volume !== volume || this.#isDisposed) return false;
+    if (!this.#fill) {
+      this.#fill = new FilledCut(volume, this.video.vertexCount);
+      this.#fill.visible = false;
+      this.#colourFill();
+      this.add(this.#fill);
+    }
+    await this.#fill.load(this.currentFrame, this.#warp);
+    if (wanted !== this.#wantedCut || !this.#fill || this.#isDisposed) return false;
+    this.#showFill(this.currentFrame);
+    return true;
+  }
+
+  /** (n, 3, 3) corners of the triangles of the section that is shown, model units, the file's origin apart; empty where the cut is hollow. */
+  get section() {
+    const { centre, scale } = this.#view;
+    return this.#fill?.corners.map((value, i) => value / scale + centre[i % 3]) ?? new Float32Array(0);
+  }
+
+  /** Where the plane of the cut is, in the geometry's units: `{axis, place, sign}`, or null. */
+  get cut() {
+    const cut = this.#wantedCut;
+    if (!cut) return null;
+    const { axis, place, isPart, sign } = cut;
+    const { centre, scale } = this.#view;
+    const { min, max } = this.#firstBox ?? this.video.bounds;
+    const own = isPart ? min[axis] + place * (max[axis] - min[axis]) : place - this.video.origin[axis];
+    return { axis, place: (own - centre[axis]) * scale, sign };
+  }
+
+  updateMatrixWorld(force) {
+    super.updateMatrixWorld(force);
+    if (!this.#plane) return;
+    const { axis, place, sign } = this.cut;
+    this.#plane.normal.set(0, 0, 0).setComponent(axis, -sign);
+    this.#plane.constant = sign * place;
+    this.#plane.applyMatrix4(this.matrixWorld);
+  }
+
   /** `{min, max}`: the box that the motion stays in, displacements with it, model units, as far as it is known. */
   get bounds() {
     return this.#warp ? this.#warp.widened(this.video.bounds) : this.video.bounds;
@@ -279,12 +344,13 @@ export class GeometryVideoMesh extends Mesh {
    */
   pick({ origin, direction }) {
     const { video, framePositions } = this;
-    const ray = [origin.toArray(), direction.toArray()];
     if (!video.triangleCount) {
-      const met = pickPoint(...ray, framePositions);
+      const met = pickPoint(origin.toArray(), direction.toArray(), framePositions);
       return met && { ...met, part: partOf(video.parts, "vertices", met.vertex) };
     }
-    const met = pickTriangle(...ray, framePositions, video.indices, this.#parts.visible);
+    const { start, most, enters } = uncutRay(origin.toArray(), direction.toArray(), this.cut);
+    if (enters && this.#fill?.isMet(start, direction.toArray())) return null; // the section has no vertices of the surface
+    const met = pickTriangle(start, direction.toArray(), framePositions, video.indices, this.#parts.visible, most);
     return met && { ...met, part: partOf(video.parts, "triangles", met.triangle) };
   }
 
@@ -319,6 +385,8 @@ export class GeometryVideoMesh extends Mesh {
     this.#unfollow();
     this.#tick = null;
     this.#closeField();
+    this.#wantedCut = null;
+    this.#closeFill();
     for (const material of [this.#materials, this.#wires?.material].flat()) material?.dispose();
     this.#wires?.geometry.dispose();
     this.#textures.dispose();
@@ -338,6 +406,7 @@ export class GeometryVideoMesh extends Mesh {
       this.#setBounds();
       this.#update();
       this.#updateField(k);
+      this.#showFill(k);
     } else {
       this.#changeLevel(positions);
     }
@@ -361,6 +430,10 @@ export class GeometryVideoMesh extends Mesh {
     /** `Float32Array` (V, 3): the frame shown, in the geometry's units. */
     this.framePositions = new Float32Array(positions.length);
     this.#place(positions, this.currentFrame);
+    if (!video.level && !this.#firstBox) {
+      this.#firstBox = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
+      stretch(this.#firstBox, positions);
+    }
     this.#parts = new PartIndex(video.parts, video.triangleCount);
     this.#parts.hide(hidden);
     this.#colours = colourAttribute(video.attributes);
@@ -380,6 +453,7 @@ export class GeometryVideoMesh extends Mesh {
     const { video } = this;
     this.#dropField();
     this.#closeDrawn();
+    this.#closeFill();
     this.#warp = this.#unmoved = null; // it comes back with the whole mesh
     this.#open(positions, this.#parts.hidden);
     this.dispatchEvent({ type: "levelchange", level: video.level });
@@ -391,6 +465,10 @@ export class GeometryVideoMesh extends Mesh {
     if (mover && video.fields.has(mover.name)) {
       const moved = this.setWarp(mover.name, scale);
       moved.then(() => this.dispatchEvent({ type: "change" }), (error) => this.#tellError(error));
+    }
+    if (this.#wantedCut) {
+      const cut = this.setClip(this.#wantedCut);
+      cut.then(() => this.dispatchEvent({ type: "change" }), (error) => this.#tellError(error));
     }
     if (!video.images.length || this.#textures.images === video.images) return;
     this.#opening = openTextures(video, this.#view.anisotropy, this.#moving, this.currentFrame).then((textures) => {
@@ -420,6 +498,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#closeField();
     if (!field) {
       this.#drawn.material = this.#materials;
+      this.#colourFill();
       return [0, 0];
     }
     const isByTriangle = field.domain === "triangle";
@@ -431,10 +510,45 @@ export class GeometryVideoMesh extends Mesh {
     this.#fieldRange = range ?? rangeOf(field, colormap);
     this.#isLog = isLogarithmic(scale, this.#fieldRange);
     this.geometry.setAttribute(this.#field.name, this.#field.attribute);
-    if (isPoints) this.#drawn.material = pointsMaterial(0xffffff, true);
+    if (isPoints) this.#drawn.material = this.#shade(pointsMaterial(0xffffff, true));
     else this.#drawn.material = this.#shade(fieldMaterial(colormap, this.#field.isColour));
     this.#updateField(this.currentFrame);
+    this.#colourFill();
     return this.#fieldRange;
+  }
+
+  /** Colours of the field that is shown, on the section. */
+  #colourFill() {
+    if (!this.#fill) return;
+    const { colormap } = this.#wanted;
+    const field = this.#field?.field;
+    this.#fill.setColours(field ? { field, colormap, range: this.#fieldRange, isLog: this.#isLog } : null);
+    this.#showFill(this.currentFrame);
+  }
+
+  /** The section of frame k; until what lies inside is in memory, there is none. */
+  #showFill(k) {
+    const [fill, warp] = [this.#fill, this.#warp];
+    if (!fill || !this.#plane || this.video.level) return;
+    const shown = { k, surface: this.framePositions, view: this.#view, warp };
+    if (fill.update(shown, this.cut)) {
+      if (k + 1 < this.video.frameCount) fill.load(k + 1, warp).catch(() => {}); // reported when it is shown
+      return;
+    }
+    fill.load(k, warp).then(
+      () => {
+        if (this.#fill !== fill || this.currentFrame !== k || this.#isDisposed) return; // another one is shown by now
+        if (fill.update({ ...shown, warp: this.#warp }, this.cut)) this.dispatchEvent({ type: "change" });
+      },
+      (error) => this.#fill === fill && this.#tellError(error),
+    );
+  }
+
+  #closeFill() {
+    if (!this.#fill) return;
+    this.remove(this.#fill);
+    this.#fill.dispose();
+    this.#fill = null;
   }
 
   #place(positions, k) {
@@ -471,6 +585,7 @@ export class GeometryVideoMesh extends Mesh {
     else this.framePositions.set(this.#unmoved);
     this.#setBounds();
     this.#update();
+    this.#showFill(k);
   }
 
   /** (3T) which corners share a normal, by the attribute, or by the angles of the frame shown. */
@@ -544,7 +659,7 @@ export class GeometryVideoMesh extends Mesh {
   }
 
   #openWires() {
-    const material = new LineBasicMaterial({ color: 0x1d2a38, transparent: true, opacity: 0.35 });
+    const material = this.#shade(new LineBasicMaterial({ color: 0x1d2a38, transparent: true, opacity: 0.35 }));
     this.#wires = Object.assign(new LineSegments(new BufferGeometry(), material), { frustumCulled: false, raycast() {} });
     this.#fillWires();
     this.add(this.#wires);
@@ -565,12 +680,13 @@ export class GeometryVideoMesh extends Mesh {
       material.flatShading = this.#isFlat;
       material.needsUpdate = true;
     }
+    material.clippingPlanes = this.#plane && [this.#plane];
     return material;
   }
 
   /** Without triangles the mesh itself draws nothing: it has no material. */
   #openPoints() {
-    this.#materials = pointsMaterial(this.#colours ? 0xffffff : 0x6f8296, Boolean(this.#colours));
+    this.#materials = this.#shade(pointsMaterial(this.#colours ? 0xffffff : 0x6f8296, Boolean(this.#colours)));
     this.#drawn = Object.assign(new Points(this.geometry, this.#materials), { frustumCulled: false });
     this.add(this.#drawn);
   }
@@ -621,6 +737,17 @@ export class GeometryVideoMesh extends Mesh {
     this.#drawn.material.dispose();
     this.#field = null;
   }
+}
+
+/** Where a ray enters what a cut leaves, and how far along it that ends; `start` is its origin where it lies in it. */
+function uncutRay(origin, direction, cut) {
+  if (!cut) return { start: origin, most: Infinity, enters: false };
+  const { axis, place, sign } = cut;
+  const [height, rise] = [sign * (origin[axis] - place), sign * direction[axis]];
+  const met = -height / rise;
+  if (height <= 0) return { start: origin, most: rise > 0 ? met : Infinity, enters: false };
+  if (!(rise < 0)) return { start: origin, most: 0, enters: false };
+  return { start: origin.map((value, k) => value + met * direction[k]), most: Infinity, enters: true };
 }
 
 /** Name of the part that has a vertex or a triangle, or null. */

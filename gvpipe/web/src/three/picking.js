@@ -6,12 +6,13 @@ const APERTURE = 0.02; // how far beside the ray a point may lie, as a part of i
  * @param {number[]} origin (3) @param {number[]} direction (3) of any length
  * @param {Float32Array} points (V, 3) @param {Uint32Array} indices (3T)
  * @param {[number, number][]} ranges of triangles that are there
+ * @param {number} [most] how far the ray goes, in lengths of its direction
  * @returns {{triangle: number, vertex: number}|null} the vertex is that corner which is nearest to where the ray meets the triangle
  */
-export function pickTriangle(origin, direction, points, indices, ranges) {
+export function pickTriangle(origin, direction, points, indices, ranges, most = Infinity) {
   const [ox, oy, oz] = origin;
   const [dx, dy, dz] = direction;
-  let nearest = Infinity;
+  let nearest = most;
   let triangle = -1;
   for (const [start, stop] of ranges) {
     for (let t = start; t < stop; t++) {

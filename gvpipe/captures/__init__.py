@@ -1,0 +1,1 @@
+"""Animations whose vertices and triangles change: shots into one file, and out of it."""

@@ -1,0 +1,129 @@
+"""Polyhedra among the cells of a grid, by their faces: as VTK's files list them, or as its streams of faces.
+
+A stream is, for each polyhedron, its number of faces, then for each face its number of corners and these.
+Source: Kitware, VTK 9.7, vtkUnstructuredGrid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gvpipe.foundation.arrays import Int64
+
+LEAST_CORNERS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Polyhedra:
+    """Faces of n polyhedra.
+
+    Args:
+        counts: ``(n,)`` how many faces each has.
+        sizes: ``(S,)`` corners of each face, polyhedron after polyhedron.
+        nodes: ``(K,)`` points, face after face.
+
+    Raises:
+        ValueError: counts that do not fit each other, or a face with less than three corners.
+    """
+
+    counts: Int64
+    sizes: Int64
+    nodes: Int64
+
+    def __post_init__(self) -> None:
+        if self.counts.min(initial=0) < 0 or self.counts.sum() != len(self.sizes) or self.sizes.sum() != len(self.nodes):
+            raise ValueError(f"its {len(self.counts)} polyhedra have other numbers of faces or corners than they say")
+        if self.sizes.min(initial=LEAST_CORNERS) < LEAST_CORNERS:
+            raise ValueError(f"a polyhedron has a face with {self.sizes.min()} corners")
+
+    def select(self, rows: Int64) -> Polyhedra:
+        """Some of them, in the order of ``rows``."""
+        faces = ranges(_starts(self.counts)[rows], self.counts[rows])
+        nodes = ranges(_starts(self.sizes)[faces], self.sizes[faces])
+        return Polyhedra(self.counts[rows], self.sizes[faces], self.nodes[nodes])
+
+    def renumbered(self, number: Int64) -> Polyhedra:
+        """The same with point ``number[p]`` in place of p."""
+        return Polyhedra(self.counts, self.sizes, number[self.nodes])
+
+    def points(self) -> tuple[Int64, Int64]:
+        """How many points each polyhedron has ``(n,)``, and these, each once, rising, polyhedron after polyhedron."""
+        owners = np.repeat(np.repeat(np.arange(len(self.counts)), self.counts), self.sizes)
+        pairs = np.unique(np.stack([owners, self.nodes], axis=1), axis=0)
+        return np.bincount(pairs[:, 0], minlength=len(self.counts)), np.ascontiguousarray(pairs[:, 1])
+
+    def equals(self, other: Polyhedra) -> bool:
+        """Whether both are the same."""
+        pairs = ((self.counts, other.counts), (self.sizes, other.sizes), (self.nodes, other.nodes))
+        return all(np.array_equal(a, b) for a, b in pairs)
+
+
+def join_polyhedra(pieces: list[Polyhedra]) -> Polyhedra:
+    """Those of several grids, whose points are numbered together by now."""
+    none = np.zeros(0, np.int64)
+    return Polyhedra(
+        np.concatenate([none, *(each.counts for each in pieces)]),
+        np.concatenate([none, *(each.sizes for each in pieces)]),
+        np.concatenate([none, *(each.nodes for each in pieces)]),
+    )
+
+
+def from_faces(offsets: Int64, faces: Int64, face_offsets: Int64, nodes: Int64) -> Polyhedra:
+    """Polyhedra by numbers of faces, which several may share.
+
+    Args:
+        offsets: ``(n + 1,)`` bounds of each polyhedron's faces in ``faces``.
+        faces: numbers of faces.
+        face_offsets: ``(S + 1,)`` bounds of each face's corners in ``nodes``.
+        nodes: points.
+
+    Raises:
+        ValueError: bounds that fall or end elsewhere, a number that is no face's.
+    """
+    for bounds, end in ((offsets, len(faces)), (face_offsets, len(nodes))):
+        if not len(bounds) or bounds[0] < 0 or bounds[-1] > end or (np.diff(bounds) < 0).any():
+            raise ValueError("the bounds of its polyhedra's faces do not rise, or end elsewhere")
+    if len(faces) and not 0 <= int(faces.min()) <= int(faces.max()) < len(face_offsets) - 1:
+        raise ValueError("a polyhedron has a face that is not there")
+    own = faces[offsets[0] : offsets[-1]]
+    sizes = np.diff(face_offsets)[own]
+    return Polyhedra(np.diff(offsets), sizes, nodes[ranges(face_offsets[own], sizes)])
+
+
+def from_streams(stream: Int64, starts: Int64, stops: Int64) -> Polyhedra:
+    """Polyhedra whose streams lie between these bounds.
+
+    Raises:
+        ValueError: a stream ends before its faces do, or behind them.
+    """
+    if len(starts) and not (int(starts.min()) >= 0 and int(stops.max()) <= len(stream) and (starts < stops).all()):
+        raise ValueError("the faces of its polyhedra end elsewhere")
+    counts = stream[starts]
+    at, found = starts + 1, []  # rows of polyhedron, rank, first corner, corners
+    for rank in range(int(counts.max(initial=0))):
+        active = np.flatnonzero(counts > rank)
+        if (at[active] >= stops[active]).any():
+            raise ValueError("the faces of its polyhedra are cut short")
+        sizes = stream[at[active]]
+        if (sizes < LEAST_CORNERS).any():
+            raise ValueError(f"a polyhedron has a face with {sizes.min()} corners")
+        found.append(np.stack([active, np.full(len(active), rank), at[active] + 1, sizes], axis=1))
+        at[active] += sizes + 1
+        if (at[active] > stops[active]).any():
+            raise ValueError("the faces of its polyhedra are cut short")
+    if (at != stops).any():
+        raise ValueError("the faces of its polyhedra end elsewhere")
+    rows = np.concatenate([np.zeros((0, 4), np.int64), *found])
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    return Polyhedra(counts, rows[:, 3], stream[ranges(rows[:, 2], rows[:, 3])])
+
+
+def ranges(starts: Int64, sizes: Int64) -> Int64:
+    """Numbers from each start on, so many of each, one after the other."""
+    return np.repeat(starts, sizes) + np.arange(sizes.sum()) - np.repeat(_starts(sizes), sizes)
+
+
+def _starts(sizes: Int64) -> Int64:
+    return np.asarray(np.cumsum(sizes) - sizes)

@@ -1,0 +1,52 @@
+"""What a notebook shows of a sequence, a player or a comparison that is the last line of a cell."""
+
+from __future__ import annotations
+
+import html
+import os
+from typing import Any
+
+from gvpipe.foundation.errors import GvpipeError
+from gvpipe.metrics.comparison import Comparison
+from gvpipe.model.sequence import MeshSequence
+from gvpipe.notebook.libraries import REMEDY, has_widgets, in_kernel
+from gvpipe.notebook.prepared import is_ready
+from gvpipe.notebook.showing import ERROR, show
+
+MOST_SAMPLES = 8_000_000  # vertices times frames, of a sequence that is encoded unasked: some seconds
+TOO_LARGE = "gvpipe.show(...) encodes it and plays it"
+
+
+def interactive(shown: Any, still: str) -> dict[str, Any] | None:
+    """Show a player, and return what a saved notebook keeps of it; None where nothing but text or a still can be shown.
+
+    Args:
+        shown: a sequence, a player, or a comparison, of which both sides play in step.
+        still: HTML that is shown, with what to do about it, where there is no player, and above the players of a comparison.
+    """
+    if not in_kernel():
+        return None
+    sources = shown.sides if isinstance(shown, Comparison) else [shown]
+    if not sources:
+        return None
+    if not has_widgets():
+        return _with_hint(still, REMEDY)
+    try:
+        if any(map(_is_large, sources)):
+            return _with_hint(still, TOO_LARGE)
+        bundle = show(*sources)._repr_mimebundle_()
+    except GvpipeError as exc:
+        return _with_hint(still, str(exc))
+    return {**bundle, "text/html": still + bundle["text/html"]} if isinstance(shown, Comparison) else bundle
+
+
+def _is_large(source: Any) -> bool:
+    """Whether a sequence takes long to encode; what files hold that are no videos is not looked at."""
+    if isinstance(source, str | os.PathLike | list | tuple):
+        return False
+    is_large = isinstance(source, MeshSequence) and source.n_frames * source.n_vertices > MOST_SAMPLES
+    return is_large and not is_ready(source, ERROR)
+
+
+def _with_hint(still: str, hint: str) -> dict[str, Any]:
+    return {"text/html": f"{still}<div>{html.escape(hint)}</div>"}
