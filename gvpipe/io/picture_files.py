@@ -99,7 +99,7 @@ class BytesPictures:
 
 
 def _size(path: Path, frame: int) -> tuple[int, int]:
-    """Of a picture, from its head; raises `InputError` that names the frame."""
+    """A picture's size, from its head; raises `InputError` that names the frame."""
     try:
         with open(path, "rb") as file:
             size = image_size(file.read())
