@@ -25,7 +25,7 @@ from gvpipe.foundation.arrays import Bool, UInt8
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.media.picture_reader import CodedPictures as CodedTrack
-from gvpipe.media.picture_reader import PictureReader, take_apart
+from gvpipe.media.picture_reader import PictureReader, take_apart, take_apart_remote
 from gvpipe.media.picture_video import COPY, DEFAULT_QUALITY, READ, check_choice, codec_of, copy_pictures, encode_pictures
 from gvpipe.media.texel_fill import TexelFill
 from gvpipe.model.sequence import MeshSequence
@@ -147,7 +147,7 @@ class TrackPictures(PictureReader):
     """The pictures of a companion track (`CodedPictures`)."""
 
     def __init__(self, companion: Companion, name: str, size: tuple[int, int], n_frames: int, budget: Budget) -> None:
-        super().__init__(lambda: take_apart(companion.file(), budget), size, n_frames, budget, name)
+        super().__init__(lambda: _taken_apart(companion, budget), size, n_frames, budget, name)
         self._companion = companion
 
     @property
@@ -165,10 +165,27 @@ class TrackPictures(PictureReader):
         return copy_pictures(self._companion.file(), self._name, fps, len(self))
 
 
+def _check_groups(given: object, about: JsonObject) -> None:
+    """Raise `CorruptFile` unless the groups are pairs of a number of pictures and a checksum."""
+    if not isinstance(given, list) or not all(isinstance(each, list) and len(each) == 2 for each in given):
+        raise about.wrong("groups", "a list of pairs")
+    numbers = [number for pair in given for number in pair]
+    if not all(type(number) is int and 0 <= number < 1 << 32 for number in numbers) or 0 in numbers[::2]:
+        raise about.wrong("groups", "a list of numbers of pictures and checksums")
+
+
 def group_checksums(coded: CodedTrack) -> list[list[int]]:
     """Return, for each group, how many pictures it has and the CRC-32 of their bytes, for readers that fetch some alone."""
     spans = itertools.pairwise(coded.starts)
     return [[stop - start, zlib.crc32(b"".join(coded.packets[start:stop]))] for start, stop in spans]
+
+
+def _taken_apart(companion: Companion, budget: Budget) -> CodedTrack:
+    """A track, of which groups are fetched when they are needed where that is possible; raises `CorruptFile`."""
+    if companion.part is None or "groups" not in companion.about:
+        return take_apart(companion.file(), budget)
+    groups = [(int(count), int(checksum)) for count, checksum in companion.about["groups"]]
+    return take_apart_remote(companion.head(), groups, companion.part)
 
 
 def read_moving(companions: Sequence[Companion], names: Mapping[int, str], n_frames: int, budget: Budget) -> dict[int, Image]:
@@ -188,6 +205,8 @@ def read_moving(companions: Sequence[Companion], names: Mapping[int, str], n_fra
         number = about.integer("image", 0, MAX_IMAGES)
         size = about.integer("width", 1, MAX_SIDE), about.integer("height", 1, MAX_SIDE)
         about.choice("codec", READ)
+        if "groups" in companion.about:
+            _check_groups(companion.about["groups"], about)
         if number in names and number not in images:
             pictures = TrackPictures(companion, names[number], size, n_frames, budget)
             images[number] = Image(names[number], MOVING, b"", pictures)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import io
 import itertools
+import zlib
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,12 +33,12 @@ class CodedPictures(NamedTuple):
     """A video taken apart.
 
     Args:
-        packets: coded pictures in the order of decoding.
+        packets: coded pictures in the order of decoding; they slice by groups.
         starts: numbers of the key frames, and of the picture after the last; each decodes alone from there.
         codec, extradata: what the decoder is set up with.
     """
 
-    packets: list[bytes]
+    packets: list[bytes] | RemotePackets
     starts: list[int]
     codec: str
     extradata: bytes | None
@@ -60,6 +61,62 @@ def take_apart(video: bytes, budget: Budget = UNLIMITED) -> CodedPictures:
             return CodedPictures([bytes(each) for each in packets], [*starts, len(packets)], context.name, context.extradata)
     except (av.FFmpegError, IndexError, ValueError) as exc:
         raise corrupt(f"the video of a moving texture cannot be read ({exc})") from exc
+
+
+class RemotePackets:
+    """Coded pictures of which a group is fetched when it is asked for; it slices by groups.
+
+    Args:
+        places: ``(first byte, one after the last)`` of each picture, among the bytes of all.
+        checksums: CRC-32 of each group, by its first picture.
+        read: returns some of the bytes.
+    """
+
+    def __init__(
+        self, places: Sequence[tuple[int, int]], checksums: Mapping[int, int], read: Callable[[int, int], bytes]
+    ) -> None:
+        self._places, self._checksums, self._read = places, checksums, read
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __getitem__(self, key: slice, /) -> list[bytes]:
+        places = self._places[key]
+        first, last = places[0][0], places[-1][1]
+        data = self._read(first, last)
+        if zlib.crc32(data) != self._checksums[key.start]:
+            raise corrupt("a group of pictures of a moving texture is damaged")
+        return [data[start - first : stop - first] for start, stop in places]
+
+
+def take_apart_remote(head: bytes, groups: Sequence[tuple[int, int]], read: Callable[[int, int], bytes]) -> CodedPictures:
+    """Return the coded pictures of a track whose samples are elsewhere.
+
+    Args:
+        head: start of the MP4 file of the track alone, up to its first sample.
+        groups: pictures of each group, and the CRC-32 of their bytes.
+        read: returns some bytes of the samples.
+
+    Raises:
+        CorruptFile: the tables do not have these groups.
+    """
+    import av
+
+    try:
+        with av.open(io.BytesIO(head), "r", format="mp4") as container:
+            stream = first_video(container, "a moving texture")
+            entries = [(entry.pos, entry.size, entry.is_keyframe) for entry in stream.index_entries]
+            context: Any = stream.codec_context
+            codec, extradata = context.name, context.extradata
+    except (av.FFmpegError, InputError, ValueError) as exc:
+        raise corrupt(f"the tables of a moving texture cannot be read ({exc})") from exc
+    starts = list(itertools.accumulate((count for count, _ in groups), initial=0))
+    places = [(place - len(head), place - len(head) + size) for place, size, _ in entries]
+    follow = all(one[1] == other[0] for one, other in itertools.pairwise(places))
+    if not places or starts[-1] != len(places) or not follow or not all(entries[start][2] for start in starts[:-1]):
+        raise corrupt("the tables of a moving texture do not have the groups that the header lists")
+    checksums = {start: checksum for start, (_, checksum) in zip(starts, groups, strict=False)}
+    return CodedPictures(RemotePackets(places, checksums, read), starts, codec, extradata)
 
 
 def take_apart_file(path: Path) -> tuple[CodedPictures, tuple[int, int], str]:

@@ -14,6 +14,7 @@ from gvpipe.asset.material import MOVING, Image, Material, Texture
 from gvpipe.asset_coding.moving_textures import MovingCoding
 from gvpipe.asset_coding.used_texels import used_texels
 from gvpipe.container.mp4 import read_bytes
+from gvpipe.container.stream_layout import StoredSections
 from gvpipe.errors import CorruptFile, InputError, SettingError
 from gvpipe.model.moving_texture import with_pictures
 
@@ -49,6 +50,31 @@ def test_other_layouts_hold_it(layout: dict[str, bool], tmp_path: Path) -> None:
     gvpipe.restream(tmp_path / "a.mp4", tmp_path / "b.mp4")
     with gvpipe.open(tmp_path / "b.mp4") as video:
         assert is_of(video.images[0].pictures.pixels(4), 4)  # type: ignore[union-attr]
+
+
+def test_a_jump_fetches_a_group_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    rows = np.kron(rng.integers(0, 256, (FRAMES, 4, 6, 3)).astype(np.uint8), np.ones((1, 8, 8, 1), np.uint8))
+    gvpipe.encode(with_pictures(sheet(FRAMES), rows), tmp_path / "a.mp4", "pca", stream=True)
+    read: list[int] = []
+    own = StoredSections.part
+
+    def noted(self: StoredSections, name: str, start: int, stop: int) -> bytes:
+        read.append(stop - start)
+        return own(self, name, start, stop)
+
+    monkeypatch.setattr(StoredSections, "part", noted)
+    with gvpipe.open(tmp_path / "a.mp4") as video:
+        pictures = video.images[0].pictures
+        assert pictures is not None and np.abs(pictures.pixels(38).astype(int) - rows[38]).mean() < 12
+        assert len(read) == 1 and read[0] < 0.8 * video.bitstream.companions[0].n_bytes
+        place = (tmp_path / "a.mp4").read_bytes().find(video.bitstream.companions[0].data())
+    data = bytearray((tmp_path / "a.mp4").read_bytes())
+    data[place + 50] ^= 0xFF
+    damaged = gvpipe.Player("a", data=bytes(data)).images[0].pictures
+    assert damaged is not None and np.array_equal(damaged.pixels(38), pictures.pixels(38))
+    with pytest.raises(CorruptFile, match="damaged"):
+        damaged.pixels(3)
 
 
 def test_info_lists_it(file: Path) -> None:
