@@ -64,7 +64,7 @@ class WrittenCapture:
 def write_capture(
     capture: Capture,
     path: StrPath,
-    code: Callable[[MeshSequence, Progress], CodedShot],
+    code: Callable[[int, MeshSequence, Progress], CodedShot],
     progress: Progress,
     is_stream: bool = False,
     companions: Sequence[Companion] = (),
@@ -74,7 +74,7 @@ def write_capture(
     Args:
         capture: its shots.
         path: of the file.
-        code: codes one of them.
+        code: codes one of them, given its number.
         progress: called with a stage's name and the part of the whole that is done.
         companions: tracks beside the video.
         is_stream: whether long shots are written so that a jump in them loads a segment alone.
@@ -88,7 +88,7 @@ def write_capture(
     coded: list[CodedShot] = []
     for number, shot in enumerate(capture.shots):
         try:
-            found = code(shot, lambda stage, done, number=number: progress(stage, (number + done) / count))  # type: ignore[misc]
+            found = code(number, shot, lambda stage, done, number=number: progress(stage, (number + done) / count))  # type: ignore[misc]
         except GvpipeError as exc:
             _name(exc, capture, number)
             raise

@@ -5,15 +5,16 @@ Positions are in world space. Nodes above the meshes are written as transforms t
 
 from __future__ import annotations
 
-import itertools
 import os
 import shutil
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gvpipe.asset.material import Image
 from gvpipe.foundation import notes
 from gvpipe.foundation.arrays import Float32
 from gvpipe.foundation.atomic import atomic_path, temporary_folder, unnamed_path
@@ -22,7 +23,7 @@ from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS, renamed_note, shadow_note, shadowed, unit_note, wide_note
 from gvpipe.io.scene.export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene.normals import SceneNormals
-from gvpipe.io.usd.material_writer import MaterialWriter
+from gvpipe.io.usd.material_writer import MaterialWriter, frame_name
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
 from gvpipe.io.usd.primvar_writer import primvar_names, write_field, write_normals, write_primvars
 from gvpipe.io.usd.signature import EXTRA
@@ -30,8 +31,8 @@ from gvpipe.io.usd.skin_writer import is_first_frame, write_skeleton
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
-FRAME_DIGITS = 4  # at least, in names of pictures of frames
 ROOT = "root"  # of meshes that have no common node
+StageMaker = Callable[[Path, str], tuple[str, ...]]  # writes a stage, given the folder of its images
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
 
@@ -45,23 +46,43 @@ def write_usd(sequence: MeshSequence, path: Path, skin: Skin | None = None) -> t
         InputError: usd-core is missing, or a position is not finite.
         OutputError: the file cannot be written.
     """
+    names = image_names(sequence)
+
+    def make(stage: Path, textures: str) -> tuple[str, ...]:
+        return write_stage(sequence, stage, path.stem, textures, skin, names)
+
+    return write_folder(make, dict(zip(names, sequence.images, strict=True)), path)
+
+
+def write_folder(make: StageMaker, images: Mapping[str, Image], path: Path) -> tuple[str, ...]:
+    """Write a stage with the images beside it, or both into one .usdz; returns what the first function returns.
+
+    Args:
+        make: writes the stage to a path that exists, given the folder of the images.
+        images: by the names of their files.
+        path: of the result.
+
+    Raises:
+        InputError: usd-core is missing, or as ``make``.
+        OutputError: a file cannot be written.
+    """
     try:
         from pxr import Tf
     except ImportError as exc:
         raise InputError(f"{path}: {EXTRA}") from exc
     try:
         if path.suffix.lower() == ".usdz":
-            return _write_package(sequence, path, skin)
+            return _write_package(make, images, path)
         with atomic_path(path) as temporary:
             folder = path.with_name(f"{path.stem}_textures")
-            said = _write_stage(sequence, temporary, path.stem, folder.name, skin)
-        _write_images(sequence, folder)
+            said = make(temporary, folder.name)
+        _write_images(images, folder)
     except (Tf.ErrorException, RuntimeError) as exc:
         raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
     return said
 
 
-def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tuple[str, ...]:
+def _write_package(make: StageMaker, images: Mapping[str, Image], path: Path) -> tuple[str, ...]:
     """A .usdz: a binary stage first, then its textures, neither compressed."""
     from pxr import Sdf, Usd
 
@@ -69,13 +90,13 @@ def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tup
     with temporary_folder() as held:
         folder = Path(held)
         stage = folder / "scene.usdc"
-        said = _write_stage(sequence, stage, path.stem, "textures", skin)
-        _write_images(sequence, folder / "textures")
+        said = make(stage, "textures")
+        _write_images(images, folder / "textures")
         with atomic_path(path) as temporary:
             package = folder / "package.usdz"
             writer = zip_writer.CreateNew(str(package))
             writer.AddFile(str(stage), f"{identifier(path.stem)}.usdc")
-            for name in itertools.chain.from_iterable(image_names(sequence)):
+            for name in _files_of(images):
                 writer.AddFile(str(folder / "textures" / name), f"textures/{name}")
             writer.Save()
             del writer
@@ -83,12 +104,22 @@ def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tup
     return said
 
 
-def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None) -> tuple[str, ...]:
+def write_stage(
+    sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None, pictures: Sequence[str]
+) -> tuple[str, ...]:
+    """Write a stage alone; returns what the format cannot hold.
+
+    Args:
+        sequence, path, skin: as of `write_usd`.
+        name: of a mesh without one.
+        textures: the folder of the images, as the stage names it.
+        pictures: names of the images' files.
+    """
     from pxr import Gf, UsdGeom, UsdSkel
 
     stage: Any = _new_stage(path)
     about = sequence.metadata
-    start = _first_code(about.start_time, sequence.fps)
+    start = first_code(about.start_time, sequence.fps)
     stage.SetTimeCodesPerSecond(sequence.fps)
     stage.SetFramesPerSecond(sequence.fps)
     stage.SetStartTimeCode(start)
@@ -105,7 +136,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     stage.SetDefaultPrim(top)
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
-    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence), start)
+    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, list(pictures), start)
     normals = SceneNormals(sequence, "USD")
     attributes = {name: each for name, each in normals.attributes.items() if name not in normals.fields}
     names = primvar_names({**attributes, **normals.fields})
@@ -138,7 +169,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes, skin is not None))
 
 
-def _first_code(start_time: float, fps: float) -> float:
+def first_code(start_time: float, fps: float) -> float:
     """The time code of a second: a whole number if it is close to one, else with six decimals."""
     code = start_time * fps
     return float(np.rint(code)) if abs(code - np.rint(code)) < CLOSE else float(np.rint(code * 1e6) / 1e6)
@@ -260,35 +291,42 @@ def _paths(meshes: list[ExportMesh]) -> list[str]:
     return result
 
 
-def image_names(sequence: MeshSequence) -> list[list[str]]:
-    """File names of each image: one, or one for each frame; none twice and none with a folder."""
+def image_names(sequence: MeshSequence) -> list[str]:
+    """A file name for each image, none twice and none with a folder."""
     endings = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp", "image/x-exr": ".exr"}
-    result: list[list[str]] = []
-    taken: set[str] = set()
+    result: list[str] = []
     for number, image in enumerate(sequence.images):
         plain = Path(os.path.basename(image.name.replace("\\", "/")) or f"image{number}")
         ending = endings.get(image.frame(0).media_type, plain.suffix)
         stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in plain.stem) or f"image{number}"
-        marks = [""] if not image.is_moving else [f"_{frame:0{FRAME_DIGITS}d}" for frame in range(sequence.n_frames)]
-        free, count = stem, 1
-        while taken & {f"{free}{mark}{ending}" for mark in marks}:
-            free, count = f"{stem}_{count}", count + 1
-        result.append([f"{free}{mark}{ending}" for mark in marks])
-        taken |= set(result[-1])
+        name, count = f"{stem}{ending}", 1
+        while name in result:
+            name, count = f"{stem}_{count}{ending}", count + 1
+        result.append(name)
     return result
 
 
-def _write_images(sequence: MeshSequence, folder: Path) -> None:
-    if not sequence.images:
+def _write_images(images: Mapping[str, Image], folder: Path) -> None:
+    if not images:
         return
     try:
         folder.mkdir(exist_ok=True)
     except OSError as exc:
         raise OutputError(f"cannot write {folder}: {exc.strerror}; choose another folder") from exc
-    for names, image in zip(image_names(sequence), sequence.images, strict=True):
-        for frame, name in enumerate(names):
-            with unnamed_path(folder / name) as temporary:
-                temporary.write_bytes(image.frame(frame).data)
+    for name, (image, frame) in _files_of(images).items():
+        with unnamed_path(folder / name) as temporary:
+            temporary.write_bytes(image.frame(frame).data)
+
+
+def _files_of(images: Mapping[str, Image]) -> dict[str, tuple[Image, int]]:
+    """The files of images by name, each with its image and frame: one, or one for each frame of an image that moves."""
+    files = {}
+    for name, image in images.items():
+        if image.pictures is None:
+            files[name] = (image, 0)
+        else:
+            files |= {frame_name(name, frame): (image, frame) for frame in range(len(image.pictures))}
+    return files
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh], has_skin: bool) -> tuple[str, ...]:
