@@ -4,7 +4,7 @@
 2. The frame that failed becomes the key. If it can be followed back to the run's first frame, it is followed on from there, and
    step 2 is repeated from where that fails. So a key tends to the middle of its run, and a surface that touches itself, which
    cannot be followed to where it parts, has a key from where it is apart.
-3. Otherwise the run ends there.
+3. Otherwise, or where the run is long, it ends there.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from gvpipe.foundation.arrays import Float64, Frames, Int32
 KEY_SHARE = 0.45  # of the rms that a followed frame may have: what a key's own may be
 GIVEN_VERTICES = 1.5  # where the number of vertices is given, frames may have this many times the key's rms
 MOST_KEYS = 4  # that are tried for one run
+LONG = 64  # frames: a run of so many gains little from another key
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def grow_run(read: Callable[[int], Surface], start: int, n_frames: int, limits: 
         return None
     best.extend(read, n_frames)
     for _ in range(MOST_KEYS - 1):
-        if best.stop >= n_frames:
+        if best.stop >= n_frames or best.stop - start >= LONG:
             break
         surface = read(best.stop)
         if surface.is_empty:
