@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import gvpipe
+from fuzz.captures import split_capture
 from fuzz.live import split_live
 from fuzz.mesh_files import CACHES, MESH
 from fuzz.parts import Parts, Seed
@@ -25,6 +26,7 @@ TESTS = ROOT / "tests"
 FOLDER = ROOT / "build" / "fuzz" / "seeds"
 LARGEST = 60_000  # bytes of a seed: larger ones take too long a case
 N_FRAMES = 6  # of samples
+SOUND_SECONDS = 0.3
 N_VERTICES = 120  # of the flag, whose first ones are taken
 FAST = {"preset": "ultrafast", "gop": 4, "clusters": 3}
 PROFILES: dict[str, tuple[str, dict[str, Any]]] = {
@@ -69,6 +71,18 @@ def load_seeds(
     return seeds, streams, formats
 
 
+def load_captures(folder: Path) -> tuple[Seed, ...]:
+    """Captures whose shots share a picture; made there if they are missing."""
+    folder = folder / "captures"
+    if not folder.exists():
+        folder.mkdir(parents=True)
+        picture = gvpipe.Image("noise", "image/png", b"\x89PNG\r\n\x1a\n" + bytes(range(200)))
+        for codec in ("pca", "pdct"):
+            shots = [replace(each, fps=24.0, images=(picture,)) for each in _samples().values()]
+            gvpipe.encode(gvpipe.Capture(shots, "samples"), folder / f"{codec}.mp4", codec)
+    return tuple(Seed(path.stem, split_capture(path.read_bytes())) for path in sorted(folder.glob("*.mp4")))
+
+
 def load_live(folder: Path) -> tuple[Seed, ...]:
     """Files that are still written; made there if they are missing."""
     folder = folder / "live"
@@ -89,6 +103,8 @@ def make_seeds(folder: Path) -> None:
     for sample, sequence in _samples().items():
         for name, (codec, settings) in PROFILES.items():
             gvpipe.encode(sequence, folder / "videos" / f"{sample}-{name}.mp4", codec, **settings)
+    voice = gvpipe.read_sound(ROOT / "samples" / "voice.wav").part(0, SOUND_SECONDS)
+    gvpipe.encode(_samples()["flag"], folder / "videos" / "flag-sound.mp4", "pdct", audio=voice)
     for sample, sequence in _scenes().items():
         for name in ("mcgv", "pca", "mcgv-affine"):
             codec, settings = PROFILES[name]

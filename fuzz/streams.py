@@ -15,6 +15,7 @@ from fuzz.parts import Parts, Seed, Target
 from fuzz.videos import FILE, parse_video
 from gvpipe.container.bitstream import CHECKSUM, HEADER, MAGIC, PREFIX, VERSION
 from gvpipe.container.boxes import BOX, uuid_head
+from gvpipe.container.companion import without_companions
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.stream_layout import COUNT, DATA_UUID, FRAGMENT, INDEX_UUID, PLACE, WHOLE
 from gvpipe.foundation.errors import FormatError
@@ -76,9 +77,16 @@ def _index_and_content(parts: Parts, head: bytes, header: bytes, start: int) -> 
             content += box + data
     entries = [bytes([len(name)]) + name.encode() + PLACE.pack(len(data), zlib.crc32(data), o) for name, data, o in rows]
     fragments = COUNT.pack(len(table)) + np.array(table, FRAGMENT).tobytes()
-    whole = WHOLE.pack(at + len(content), len(head), zlib.crc32(head))
+    whole = WHOLE.pack(at + len(content), len(head), _head_checksum(head))
     index = b"".join([MAGIC, PREFIX.pack(VERSION, len(rows)), *entries, fragments, whole])
     return index + CHECKSUM.pack(zlib.crc32(index)), content
+
+
+def _head_checksum(head: bytes) -> int:
+    try:
+        return zlib.crc32(without_companions(head))
+    except FormatError:
+        return zlib.crc32(head)
 
 
 def _n_pictures(moof: bytes) -> int:

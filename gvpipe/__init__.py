@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gvpipe.asset.metadata import Metadata
     from gvpipe.asset.part import Part
     from gvpipe.batch.runs import BatchReport, encode_all
+    from gvpipe.captures.files import write
     from gvpipe.foundation.errors import GvpipeError
     from gvpipe.grids.cells import Cells
     from gvpipe.grids.volume import Volume
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from gvpipe.model.skin import Skin
     from gvpipe.notebook import show
     from gvpipe.playback.capture_player import CapturePlayer
-    from gvpipe.playback.files import read, read_capture, write
+    from gvpipe.playback.files import read, read_capture
     from gvpipe.playback.live import LiveEncoder, open_live
     from gvpipe.playback.player import Player
     from gvpipe.playback.video_info import Info, info
@@ -109,7 +110,8 @@ _HOMES = {
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
     "gvpipe.notebook": ("show",),
     "gvpipe.playback.capture_player": ("CapturePlayer",),
-    "gvpipe.playback.files": ("read", "read_capture", "write"),
+    "gvpipe.captures.files": ("write",),
+    "gvpipe.playback.files": ("read", "read_capture"),
     "gvpipe.playback.live": ("LiveEncoder", "open_live"),
     "gvpipe.media.sound": ("Sound",),
     "gvpipe.media.sound_files": ("read_sound",),

@@ -18,6 +18,7 @@ from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
 from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
 from gvpipe.asset_coding.sound_track import read_sound as read_sound_track
+from gvpipe.captures import tracking
 from gvpipe.captures.encoding import CodedShot, write_capture
 from gvpipe.coding.codec import Codec, Encoded
 from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
 
 TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
 LAYOUTS = ("stream", "bare")
+NO_TARGETS = (None, None, None, None)
 CAPTURE_CODEC = "pca"  # of shots, which are short: `mcgv` looks for motion that they do not have
 
 
@@ -175,6 +177,8 @@ def encode(
     real_time: bool = False,
     warp: str | None = None,
     volume: bool | None = None,
+    track: bool | None = None,
+    vertices: int | None = None,
     audio: StrPath | Sound | bool | None = None,
     audio_codec: str | None = None,
     audio_bitrate: int | None = None,
@@ -212,6 +216,11 @@ def encode(
         clip, mesh, frames, unlimited, real_time, warp: as for `read`.
         volume: whether what lies inside of a simulation's surface is coded, too. None: of a sequence or a geometry video, yes;
             of other files, if it takes less than a third of the other bytes. A note says what was chosen.
+        track: of a capture whose frames have meshes of their own: let key meshes follow the surface, so that long shots take
+            their place (`gvpipe.captures.tracking`); ``max_error`` then bounds the distance between the surfaces, both ways.
+            None: where most frames have a mesh of their own, and nothing but colours would be lost. Without a target, vertices
+            are then coded to an rmse of 0.0007 of the diagonal.
+        vertices: of each key mesh; None: as few as its distance from the surface allows.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
         memory: bytes that encoding may take, about, in each process: segments are as short as it needs. Codec ``mcgv`` cannot.
@@ -250,7 +259,8 @@ def encode(
         beside = AssetOptions.of(attributes, fields, textures)
         if isinstance(source, Capture):
             capture = _some_of(source, frames, fps)
-            return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
+            wanted = _CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
+            return _encode_capture(capture, wanted, path, clock)
         try:
             sequence, spares_volume, chosen = _open_with_inside(source, path, fps, options, volume)
             sequence = with_sound(sequence, sounds, frames)
@@ -265,7 +275,8 @@ def encode(
             if isinstance(source, MeshSequence):
                 raise
             capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
-            return _encode_capture(capture, request, path, beside, sounds, frames, memory, layout, clock)
+            wanted = _CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
+            return _encode_capture(capture, wanted, path, clock)
     size, bitstream = _write(sequence, coded, path, clock, layout)
     clock("", 1.0)
     chosen += () if asset.volume_choice is None else (asset.volume_choice.note,)
@@ -304,32 +315,44 @@ class _Request:
         return _candidates(codec, self.settings, self.purpose)
 
 
-def _encode_capture(
-    capture: Capture,
-    request: _Request,
-    path: StrPath,
-    beside: AssetOptions,
-    sounds: AudioOptions,
-    frames: tuple[int, int | None] | None,
-    memory: int | None,
-    layout: str,
-    clock: _StageClock,
-) -> Report:
+@dataclass(frozen=True)
+class _CaptureRequest:
+    """What was asked for of a capture: `encode`'s arguments."""
+
+    request: _Request
+    beside: AssetOptions
+    sounds: AudioOptions
+    frames: tuple[int, int | None] | None
+    memory: int | None
+    layout: str
+    track: bool | None
+    vertices: int | None
+
+
+def _encode_capture(capture: Capture, wanted: _CaptureRequest, path: StrPath, clock: _StageClock) -> Report:
     """Encode each shot as a sequence."""
     from gvpipe.asset_coding.encoder import AssetCoder
 
-    if layout == BARE:
+    request, memory = wanted.request, wanted.memory
+    if wanted.layout == BARE:
         raise SettingError(f"{capture.name}: vertices or triangles change; bare files keep them: leave out bare (--bare)")
     diagonal = frame_diagonal(capture.shots[0])
+    n_given, change = len(capture.shots), capture.lengths[0]
+    tracked = _tracked(capture, wanted, diagonal, clock)
+    capture = tracked.capture
     given = request.candidates(CAPTURE_CODEC if _knows(CAPTURE_CODEC, request.settings) else None)
     is_free = request.codec is None and request.purpose is None and "reorder" not in request.settings
 
-    def code(shot: MeshSequence, progress: Progress) -> CodedShot:
+    def code(number: int, shot: MeshSequence, progress: Progress) -> CodedShot:
         fitting = given if memory is None else fit_segments(given, shot.n_vertices, memory)
-        if is_free and len(shot) == 1 and isinstance(fitting, Codec):  # nobody knows its vertices from other frames
+        is_followed = tracked.keys[number] is not None
+        if is_free and (len(shot) == 1 or is_followed) and isinstance(fitting, Codec):  # nobody knows its vertices
             fitting = dataclasses.replace(fitting, reorder=True)
-        target = _shot_target(shot, request.targets, diagonal)
-        asset = AssetCoder(shot.with_sound(None), beside)
+        targets = tracking.coding_targets(request.targets, is_followed) if tracked.is_any else request.targets
+        if targets == NO_TARGETS and tracked.is_any and "quality" not in request.settings:
+            targets = (tracking.CODED_RMSE, None, None, None)
+        target = _shot_target(shot, targets, diagonal)
+        asset = AssetCoder(shot.with_sound(None), wanted.beside)
         coded = _code(shot, fitting, target, asset, True, progress)
         x, y, z = shot.origin.tolist()
         bitstream = dataclasses.replace(coded.encoded.bitstream, origin=(x, y, z), is_bare=True)
@@ -338,13 +361,13 @@ def _encode_capture(
         left_out = [*sorted(asset.plan.left_out), *shot.not_carried]
         return CodedShot(bitstream, coded.codec, _notes(shot, target, asset.plan), left_out)
 
-    sound, heard = sound_beside(capture.sound, len(capture) / capture.fps, sounds, capture.fps, frames)
+    sound, heard = sound_beside(capture.sound, len(capture) / capture.fps, wanted.sounds, capture.fps, wanted.frames)
     sound, damaged = whole_sound(sound)
     companions = () if sound is None else (pack_sound(sound),)
-    found = write_capture(capture, path, code, clock, layout == STREAM, companions)
+    found = write_capture(capture, path, code, clock, wanted.layout == STREAM, companions)
     clock("", 1.0)
     first, size = found.coded[0], found.written.size
-    many = [notes.shots(capture.name, len(capture.shots), capture.starts[1])] if len(capture.shots) > 1 else []
+    many = [] if n_given < 2 else [notes.shots(capture.name, n_given, len(capture.shots), change), *tracked.notes]
     return Report(
         codec=first.codec.id,
         settings=dataclasses.asdict(first.codec),
@@ -360,9 +383,18 @@ def _encode_capture(
         tried=[],
         reason="",
         notes=[*many, *heard, *damaged, *found.notes],
-        shots=found.shots,
+        shots=[{**row, "key": key} for row, key in zip(found.shots, tracked.keys, strict=True)],
         audio=None if sound is None else sound.to_json(),
     )
+
+
+def _tracked(capture: Capture, wanted: _CaptureRequest, diagonal: float, clock: _StageClock) -> tracking.Tracked:
+    """The capture as it came, or with its surface followed."""
+    if wanted.track is False or (wanted.track is None and not tracking.is_tracked_by_default(capture)):
+        return tracking.Tracked(capture, (None,) * len(capture.shots), ())
+    bound = wanted.request.targets[TARGETS.index("max_error")]
+    part = None if bound is None or not diagonal else parse_bound(bound, capture.shots[0]) / diagonal
+    return tracking.track(capture, part, wanted.vertices, clock)
 
 
 def _knows(codec: str, settings: Mapping[str, Any]) -> bool:

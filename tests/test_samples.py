@@ -21,7 +21,8 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """The names of ``make_samples.py``, whose modules are gone afterwards."""
     monkeypatch.syspath_prepend(str(SAMPLES))
     yield runpy.run_path(str(SAMPLES / "make_samples.py"))
-    for module in ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise", "voice"):
+    names = ("animation", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise", "voice", "splash")
+    for module in names:
         sys.modules.pop(module, None)
 
 
@@ -31,6 +32,21 @@ def test_ball_frames_are_what_the_script_makes(script: dict[str, Any], tmp_path:
     assert [path.name for path in made] == [f"ball_{i:04d}.obj" for i in range(1, 25)]
     for path in made:  # rounded on writing, so that other versions of numpy write the same
         assert path.read_bytes() == (SAMPLES / "ball_frames" / path.name).read_bytes()
+
+
+def test_the_splash_is_what_its_script_makes(script: dict[str, Any], tmp_path: Path) -> None:
+    """Two drops become one and part, in frames some of which share their triangles."""
+    runpy.run_path(str(SAMPLES / "splash.py"))["write_splash"](tmp_path)
+    made = sorted(tmp_path.iterdir())
+    assert [path.name for path in made] == [f"splash_{number:02d}.obj" for number in range(1, 13)]
+    for path in made:  # rounded on writing, so that other versions of numpy write the same
+        assert path.read_bytes() == (SAMPLES / "splash" / path.name).read_bytes()
+    assert sum(path.stat().st_size for path in made) < 150_000
+    capture = gvpipe.read_capture(SAMPLES / "splash")
+    assert capture.lengths == (3, 1, 1, 1, 3, 1, 1, 1)
+    pieces = [components(adjacency(shot.faces, shot.n_vertices))[0] for shot in capture.shots]
+    assert pieces == [2, 2, 2, 1, 1, 1, 2, 2]
+    assert all(2 * len(unique_edges(shot.faces)) == 3 * len(shot.faces) for shot in capture.shots)
 
 
 def test_the_voice_is_what_the_script_makes(script: dict[str, Any], tmp_path: Path) -> None:

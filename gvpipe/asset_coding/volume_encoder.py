@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.asset.attribute import Attribute
-from gvpipe.asset.field import Field
 from gvpipe.asset_coding.bounds import Given
 from gvpipe.asset_coding.directory import CODED, REDUCED, entry_of
 from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
@@ -55,20 +53,20 @@ class VolumeCoder:
     Args:
         sequence: with a volume.
         options: bounds by name, those of the surface's numbers.
-        kept: names of the surface's attributes and fields that the file has.
+        kept: the surface's attributes and fields that the file has, by name; how fields are coded.
 
     Raises:
         InputError: numbers that are not finite, or of digits that their bound does not keep.
     """
 
-    def __init__(self, sequence: MeshSequence, volume: Volume, options: AssetOptions, kept: Collection[str]) -> None:
+    def __init__(self, sequence: MeshSequence, volume: Volume, options: AssetOptions, kept: Mapping[str, object]) -> None:
         self._sequence, self._volume = sequence, volume
         self._plans: list[tuple[str, FieldPlan]] = []
         for name, field in (*volume.point_fields.items(), *volume.cell_fields.items()):
             given: Given = options.fields if name in sequence.fields else options.attributes
             if name not in kept:
                 continue
-            span = _span_of(sequence, name)
+            span = _span_of(kept[name], sequence, name)
             plan, _ = plan_field(name, field, given.get(name), sequence.name, span=span, place="inside, ")
             if plan is not None:
                 self._plans.append((name, plan))
@@ -152,10 +150,11 @@ class VolumeCoder:
         return min(AS_LARGE * math.sqrt(3 * squares / max(count, 1)), largest / math.sqrt(3))
 
 
-def _span_of(sequence: MeshSequence, name: str) -> tuple[float, float]:
-    """Smallest and largest number of the surface, of the first frame of a field."""
-    one: Field | Attribute = sequence.fields[name] if name in sequence.fields else sequence.attributes[name]
-    values = (one.read(0, 1) if isinstance(one, Field) else np.asarray(one)).astype(np.float64)
+def _span_of(plan: object, sequence: MeshSequence, name: str) -> tuple[float, float]:
+    """Smallest and largest number of the surface, of all frames of a field."""
+    if isinstance(plan, FieldPlan):
+        return plan.scan.low, plan.scan.high
+    values = np.asarray(sequence.attributes[name]).astype(np.float64)
     return float(np.fmin.reduce(values, axis=None, initial=np.inf)), float(np.fmax.reduce(values, axis=None, initial=-np.inf))
 
 

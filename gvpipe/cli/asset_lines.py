@@ -25,12 +25,13 @@ def shape_lines(info: Info | SourceInfo) -> Iterator[str]:
 
 
 def shot_line(row: dict[str, Any]) -> str:
-    """What a shot of a capture is, of a row of `Info.shots`."""
+    """What a shot of a capture is, of a row of `Info.shots` or `SourceInfo.shots`."""
     from gvpipe.foundation.notes import count
 
     span = f"frames {row['start']}:{row['start'] + row['frames']}"
     size = f"{count(row['vertices'], 'vertex', 'vertices')}, {count(row['triangles'], 'triangle')}"
-    return f"shot of {span}: {size}, {row['codec']}, {row['bytes']} bytes"
+    coded = f", {row['codec']}, {row['bytes']} bytes" if "codec" in row else ""
+    return f"shot of {span}: {size}{coded}"
 
 
 def asset_lines(info: Info | SourceInfo) -> Iterator[str]:

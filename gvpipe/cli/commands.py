@@ -448,13 +448,13 @@ def info(
 
 def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -> None:
     """Print what is read of an input that is no geometry video; ``reading`` are further arguments of `source_info`."""
-    from gvpipe.cli.asset_lines import asset_lines, shape_lines, time_lines
+    from gvpipe.cli.asset_lines import asset_lines, shape_lines, shot_line, time_lines
     from gvpipe.io.source_info import source_info
 
     found = source_info(path, **reading)
     out.json(found.to_json())
     out.text(shown(source, STDIN) + ("" if found.bytes is None else f": {_size(found.bytes)}"))
-    for line in [*shape_lines(found), *asset_lines(found), *time_lines(found)]:
+    for line in [*shape_lines(found), *asset_lines(found), *time_lines(found), *map(shot_line, found.shots)]:
         out.text(line)
     for note in found.notes:
         out.note(note)

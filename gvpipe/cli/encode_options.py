@@ -63,6 +63,14 @@ OPTIONS = (
     real_time_option,
     warp_option,
     volume_option,
+    click.option(
+        "--track",
+        is_flag=False,
+        flag_value="on",
+        type=click.Choice(["on", "off"]),
+        help="Let one mesh follow the surface where frames have meshes of their own. [default: if most have]",
+    ),
+    click.option("--vertices", type=int, metavar="N", help="Of each mesh that follows. [default: as few as will do]"),
     click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp."),
     click.option(
         "--stream",
@@ -133,6 +141,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
     making = {}
     if isinstance(codec, Codec) and options["codec"] is None:  # which one is the default depends on the input
         codec, making = None, {name: getattr(codec, name) for name in settings}
+    making |= {"track": None if options["track"] is None else options["track"] == "on", "vertices": options["vertices"]}
     making |= {**targets, "textures": options["textures"], "stream": options["stream"], "bare": options["bare"]}
     making["memory"] = None if options["memory"] is None else parse_bytes("--memory", options["memory"])
     making["attributes"] = _parse_bounds("--attribute", options["attributes"])

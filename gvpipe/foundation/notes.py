@@ -62,10 +62,11 @@ def whole_numbers(names: Sequence[str]) -> tuple[str, ...]:
     return (f"whole numbers alone, so kept exactly: {listed} ({each})",) if names else ()
 
 
-def shots(name: str, n_shots: int, first: int) -> str:
-    """That an input has become a capture."""
-    times = count(n_shots - 1, "time")
-    return f"{name}: vertices or triangles change {times}, first at frame {first}; the file is a capture of {n_shots} shots"
+def shots(name: str, n_meshes: int, n_shots: int, first: int) -> str:
+    """That an input of several meshes has become a capture."""
+    changes = count(n_meshes - 1, "time")
+    is_made = f"the file is a capture of {count(n_shots, 'shot')}"
+    return f"{name}: vertices or triangles change {changes}, first at frame {first}; {is_made}"
 
 
 def not_carried(names: Sequence[str]) -> tuple[str, ...]:

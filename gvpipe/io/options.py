@@ -3,9 +3,27 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from gvpipe.foundation.errors import InputError
+
+Kept = TypeVar("Kept")
+
+
+class RunMemory:
+    """What reading one run of an input leaves for the next: files found, libraries' processes, opened archives."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Any] = {}
+
+    def keep(self, name: str, make: Callable[[], Kept]) -> Kept:
+        """What ``make`` returned for a name first."""
+        if name not in self._kept:
+            self._kept[name] = make()
+        kept: Kept = self._kept[name]
+        return kept
 
 
 @dataclass(frozen=True)
@@ -21,6 +39,7 @@ class ReadOptions:
         unlimited: whether a library that runs in a process of its own may take any memory.
         real_time: whether steps of a simulation keep their clock, however many there are a second.
         volume: whether what lies inside of a simulation's surface is read, too.
+        memory: given, what is read may end before vertices or triangles change, as `gvpipe.io.runs` asks.
     """
 
     fps: float | None = None
@@ -30,6 +49,11 @@ class ReadOptions:
     unlimited: bool = False
     real_time: bool = False
     volume: bool = False
+    memory: RunMemory | None = None
+
+    def keep(self, name: str, make: Callable[[], Kept]) -> Kept:
+        """What ``make`` returns; where there is a memory, what it returned there for the same name."""
+        return make() if self.memory is None else self.memory.keep(name, make)
 
     def span(self, n_frames: int, where: str) -> tuple[int, int]:
         """First frame of a file of ``n_frames``, and the one after the last; ``where`` is the file, for messages.

@@ -14,8 +14,18 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.io.cut_pictures import cut_notes
 from gvpipe.io.damage import check_file, reading
 from gvpipe.io.formats import FRAME_FORMATS
-from gvpipe.io.options import ReadOptions
-from gvpipe.io.scene_formats import HAVE_CLIPS, IN_PROCESSES, MARKERS, OPENVAT, POINT_CACHES, SCENES, SIMULATIONS, scene_readers
+from gvpipe.io.options import ReadOptions, RunMemory
+from gvpipe.io.scene_formats import (
+    GLTF,
+    HAVE_CLIPS,
+    IN_PROCESSES,
+    MARKERS,
+    OPENVAT,
+    POINT_CACHES,
+    SCENES,
+    SIMULATIONS,
+    scene_readers,
+)
 
 if TYPE_CHECKING:
     from gvpipe.model.sequence import MeshSequence
@@ -30,6 +40,7 @@ def read(
     unlimited: bool = False,
     real_time: bool = False,
     volume: bool = False,
+    memory: RunMemory | None = None,
 ) -> MeshSequence:
     """Read a mesh sequence.
 
@@ -47,12 +58,13 @@ def read(
         real_time: whether steps of a simulation keep their clock, however many there are a second; else the film has a rate
             that a person can watch (`gvpipe.io.simulation.times`).
         volume: whether what lies inside of a simulation's surface is read, too (`gvpipe.Volume`).
+        memory: given, the result may end before vertices or triangles change; ``changes_at`` of its positions says where.
 
     Raises:
         InputError: the path or what it holds cannot be used. Frame files after the first are read, and may raise it,
             when their positions are.
     """
-    options = ReadOptions(fps, clip, mesh, frames, unlimited, real_time, volume)
+    options = ReadOptions(fps, clip, mesh, frames, unlimited, real_time, volume, memory)
     if isinstance(path, str) and is_stored(path):
         from gvpipe.io.store_files import read_stored
 
@@ -92,14 +104,15 @@ def _read(path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], optio
         with contextlib.nullcontext() if suffix in IN_PROCESSES else reading(Path(path), ""):
             sequence = reader(Path(path), options)
         if sequence is not None:
-            return sequence if suffix in (*SIMULATIONS, *SCENES) else _span(sequence, options.frames)
+            has_span = suffix in (*SIMULATIONS, *SCENES) or (suffix in GLTF and options.memory is not None)
+            return sequence if has_span else _span(sequence, options.frames)
     return _read_frames(path, options)
 
 
 def _read_frames(path: str | list[str], options: ReadOptions) -> MeshSequence:
     from gvpipe.io.frames.reader import read_frames
 
-    return read_frames(path, options.fps, options.frames, options.real_time, options.volume)
+    return read_frames(path, options)
 
 
 READERS = scene_readers(read)

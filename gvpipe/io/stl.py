@@ -21,7 +21,7 @@ import numpy as np
 
 from gvpipe.asset.part import Part
 from gvpipe.foundation.arrays import Array, Float32, Float64, Int32, Int64
-from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.io.losses import lost_notes
 from gvpipe.io.mesh import FrameEncoder, Mesh, as_faces
 from gvpipe.model.origin import choose_origin, narrow
@@ -45,7 +45,7 @@ class StlLoader:
         """Load one file.
 
         Raises:
-            InputError: corners that were one vertex in the first file are apart in this one.
+            TopologyChange: there are other triangles than in the first file, or corners that were one vertex there are apart.
             Exception: the file cannot be read; trimesh raises many kinds, and the caller names the file.
         """
         exact, solids, lost = _load_corners(path)
@@ -57,18 +57,17 @@ class StlLoader:
             self._faces = as_faces(corner_vertices.reshape(-1, 3), len(self._corner_of))
             self._first = path
         if len(corners) != self._faces.size:
-            raise InputError(
-                f"{path.name} has {len(corners) // 3} triangles, {self._first.name} has {len(self._faces)}; "
-                "all frames need the same triangles"
-            )
+            found, expected = len(corners) // 3, len(self._faces)
+            raise TopologyChange(f"{path.name} has {found} triangles, {self._first.name} has {expected}", 0)
         positions = corners[self._corner_of]
         apart = np.flatnonzero((positions[self._faces.reshape(-1)] != corners).any(axis=1))
         if len(apart):
             check_finite(corners[None], str(path))  # a NaN differs from itself
             corner = int(apart[0])
-            raise InputError(
+            raise TopologyChange(
                 f"corner {corner % 3} of triangle {corner // 3} shares a vertex with another in {self._first.name} "
-                f"but not in {path.name}; STL has no vertices of its own: export OBJ, PLY or GLB"
+                f"but not in {path.name}, since STL has no vertices of its own (OBJ, PLY and GLB have)",
+                0,
             )
         return Mesh(exact[self._corner_of], self._faces, parts=_make_parts(solids, self._faces), not_carried=lost)
 

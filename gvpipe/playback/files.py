@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -15,6 +16,7 @@ from gvpipe.foundation.arguments import StrPath, check_path, show
 from gvpipe.foundation.errors import InputError, SeveralShots, TopologyChange
 
 if TYPE_CHECKING:
+    from gvpipe.io.options import RunMemory
     from gvpipe.io.runs import Run
     from gvpipe.model.capture import Capture
     from gvpipe.model.sequence import MeshSequence
@@ -83,6 +85,7 @@ def _read(
     unlimited: bool,
     real_time: bool,
     volume: bool,
+    memory: RunMemory | None = None,
 ) -> MeshSequence:
     from gvpipe.io.reading import read as read_sequence
 
@@ -90,11 +93,11 @@ def _read(
         for file in path:
             check_path(file, "a file of gvpipe.read's list")
         if len(path) != 1:
-            return read_sequence(path, fps, clip, mesh, frames, unlimited, real_time, volume)
+            return read_sequence(path, fps, clip, mesh, frames, unlimited, real_time, volume, memory)
         path = path[0]
     one = check_path(path, "what gvpipe.read is given", "a list of frame files or ")
     if not is_video(one):
-        return read_sequence(one, fps, clip, mesh, frames, unlimited, real_time, volume)
+        return read_sequence(one, fps, clip, mesh, frames, unlimited, real_time, volume, memory)
     if clip is not None:
         raise InputError(f"{one} has no clips; clip={clip!r} is for a single .glb or .gltf")
     if mesh is not None:
@@ -143,6 +146,7 @@ def read_capture(
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
     """
+    from gvpipe.io.runs import at_one_rate
     from gvpipe.model.capture import Capture
 
     if is_video(path) and clip is None and mesh is None and warp is None:
@@ -154,7 +158,7 @@ def read_capture(
     how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
     runs = read_runs(path, fps, clip, mesh, frames, **how)
     name = path if isinstance(path, str | os.PathLike) else path[0]
-    return Capture([run.sequence for run in runs], os.fspath(name))
+    return Capture(at_one_rate(runs), os.fspath(name))
 
 
 def is_video(path: Source) -> TypeGuard[StrPath]:
@@ -181,6 +185,7 @@ def read_runs(
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
     """
+    from gvpipe.io.options import RunMemory
     from gvpipe.io.runs import Run, find_runs
 
     if is_video(path) and clip is None and mesh is None and warp is None:
@@ -188,10 +193,20 @@ def read_runs(
         begin = 0 if frames is None else frames[0]
         spans = zip(capture.starts, capture.lengths, capture.shots, strict=True)
         return [Run(begin + start, begin + start + length, shot) for start, length, shot in spans]
-    return find_runs(
-        lambda span: read(path, fps, clip, mesh, span, unlimited=unlimited, real_time=real_time, warp=warp, volume=volume),
-        frames,
-    )
+    memory = RunMemory()
+
+    def run(span: tuple[int, int | None] | None) -> MeshSequence:
+        sequence = _read(path, fps, clip, mesh, span, unlimited, real_time, bool(volume), memory)
+        if volume is None and has_inside(sequence):
+            sequence = _read(path, fps, clip, mesh, span, unlimited, real_time, True, memory)
+        return sequence
+
+    runs = find_runs(run, frames)
+    if warp is None:
+        return runs
+    from gvpipe.model.warp import warped
+
+    return [replace(run, sequence=warped(run.sequence, warp)) for run in runs]
 
 
 def write(sequence: MeshSequence, path: StrPath, start: int = 0, skin: Skin | None = None, compress: str = "none") -> list[str]:

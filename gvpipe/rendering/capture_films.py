@@ -87,7 +87,7 @@ class CaptureFilm:
             x, y, z = np.asarray(camera.target) + self._film.middle(own) - self._start
             camera = replace(camera, target=(float(x), float(y), float(z)))
         picture = self._film.paint(own, camera)
-        self.notes |= dict.fromkeys(self._film.renderer.notes)
+        self.notes |= dict.fromkeys(self._film.notes)
         return picture
 
     def _shot(self, number: int, options: PictureOptions) -> MeshSequence:

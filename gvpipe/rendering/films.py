@@ -61,18 +61,23 @@ class Film:
         shown: whose values the colours show, in place of materials.
         legend: ``(H, w, 3) uint8``, a strip at the left.
         follow: whether the camera goes with the mesh.
-        cut: by a plane, in place of the renderer's mesh.
+        cut: by a plane, in place of the renderer; one of both is there.
     """
 
     sequence: MeshSequence
     frames: list[int]
     camera: Camera
-    renderer: Renderer
+    renderer: Renderer | None
     turntable: bool = False
     shown: ColourMap | None = None
     legend: UInt8 | None = None
     follow: bool = False
     cut: CutScene | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know, a line each."""
+        return () if self.renderer is None else self.renderer.notes
 
     @property
     def fps(self) -> float:
@@ -109,7 +114,8 @@ class Film:
 
     def paint(self, frame: int, camera: Camera) -> UInt8:
         """A frame of the sequence, with its legend."""
-        if self.cut is not None:
+        if self.renderer is None:
+            assert self.cut is not None
             picture = self.cut.draw(frame, camera)
         else:
             values = self.shown.values(frame) if self.shown else None
@@ -191,7 +197,7 @@ def write_pictures(
     film = plan_film(sequence, drawn_frames(sequence, options.frame, suffix, options.turntable), suffix, options, reference)
     with unnamed_path(path) as temporary:
         WRITERS[suffix](film, temporary, progress)
-    return film.renderer.notes
+    return film.notes
 
 
 def check_output(path: Path, options: PictureOptions) -> str:
@@ -246,9 +252,10 @@ def plan_film(
     )
     samples = STILL_SAMPLES if suffix == STILL else FILM_SAMPLES
     plain = options.plain or shown is not None
-    renderer = Renderer.of(sequence, (across, height), options.shading, samples, plain=plain, colors=colors)
-    cut = None
-    if options.cut is not None:
+    renderer = cut = None
+    if options.cut is None:
+        renderer = Renderer.of(sequence, (across, height), options.shading, samples, plain=plain, colors=colors)
+    else:
         if reference is not None:
             raise InputError("a plane and errors are asked for; leave one of both out")
         look = CutLook((across, height), options.shading, samples, colors)

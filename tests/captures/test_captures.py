@@ -13,6 +13,7 @@ import pytest
 from changing import SIZES, SPANS, sheet, write_objs
 from file_server import serving
 from folders import SAMPLES
+from sequences import grid
 
 import gvpipe
 from gvpipe.container.mp4 import read_index
@@ -258,6 +259,44 @@ def test_sound_of_the_whole_film(run: Run, video: Path, tmp_path: Path) -> None:
         assert opened[4].shape == (49, 3)
     ended = run("decode", tmp_path / "d.mp4", tmp_path / "out" / "%d.ply")
     assert ended.status == 0 and "sound is left out" in ended.err.replace("sound of the file", "sound")
+
+
+def test_a_surface_is_followed(tmp_path: Path) -> None:
+    """A box that grows, with other vertices and triangles in each frame, becomes one shot."""
+    boxes = []
+    for frame in range(4):
+        points, faces = box(6 + frame, 1 + 0.05 * frame)
+        colours = np.clip((points + 1.2) * 100, 0, 255).astype(np.uint8)
+        boxes.append(MeshSequence(points[None], faces, 25.0, {"color": colours}))
+    capture = gvpipe.Capture(boxes, "box")
+    report = gvpipe.encode(capture, tmp_path / "a.mp4")
+    assert len(report.shots) == 1 and report.shots[0]["key"] in range(4)
+    assert any("4 frames follow 1 key mesh: rms" in note for note in report.notes)
+    found = gvpipe.open_capture(tmp_path / "a.mp4").capture()
+    for frame in range(4):
+        reach = np.abs(found.frame(frame)[0]).max(axis=1)
+        assert np.abs(reach - (0.5 + 0.025 * frame)).max() < 0.02
+    shot = found.shots[0]
+    colour = np.asarray(shot.attributes["color"])[:, :3].astype(float)
+    key = report.shots[0]["key"]
+    assert np.abs(colour - np.clip((found.frame(key)[0] + 1.2) * 100, 0, 255)).max() < 12
+    as_it_came = gvpipe.encode(capture, tmp_path / "b.mp4", track=False)
+    assert [row["key"] for row in as_it_came.shots] == [None] * 4
+    bounded = gvpipe.encode(capture, tmp_path / "c.mp4", track=True, max_error="2%")
+    errors = gvpipe.compare(capture, tmp_path / "c.mp4").surface
+    assert errors is not None and errors.max_diag is not None and errors.max_diag <= 0.02 and len(bounded.shots) < 4
+
+
+def box(n: int, side: float) -> tuple[Any, Any]:
+    """A cube whose faces have n x n squares, each of two triangles."""
+    points, faces = grid(n + 1)
+    flat = (points - points.min(axis=0)) / np.ptp(points, axis=0).max() * side - side / 2
+    flat[:, 2] = side / 2
+    turns = [np.roll(np.eye(3), k, axis=0) for k in range(3)]
+    sides = [flat @ turn * sign for turn in turns for sign in (1, -1)]
+    wound = [faces if sign > 0 else faces[:, ::-1] for _ in turns for sign in (1, -1)]
+    triangles = [each + k * len(points) for k, each in enumerate(wound)]
+    return np.concatenate(sides).astype(np.float32), np.concatenate(triangles).astype(np.int32)
 
 
 def test_among_many(run: Run, tmp_path: Path) -> None:

@@ -8,8 +8,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from asset_scene import scene
+from changing import sheet
 from folders import DATA, GOLDEN, ROOT
 from sequences import wrinkled
 
@@ -49,6 +51,15 @@ def test_a_damaged_file_has_errors(tmp_path: Path) -> None:
     (tmp_path / "b.glb").write_bytes(data.replace(b'"VEC3"', b'"VEC2"'))
     (report,) = reports(tmp_path / "b.glb")
     assert report["issues"]["numErrors"] and faults(report)
+
+
+def test_no_error_in_captures(tmp_path: Path) -> None:
+    points = [np.repeat(sheet(side, 0)[0][None], count, axis=0) for side, count in ((4, 2), (5, 1))]
+    points[0][1] += 1
+    shots = [gvpipe.MeshSequence(each, sheet(side, 0)[1]) for each, side in zip(points, (4, 5), strict=True)]
+    gvpipe.write(gvpipe.Capture(shots), tmp_path / "a.glb")
+    (report,) = reports(tmp_path / "a.glb")
+    assert not faults(report) and report["info"]["animationCount"] == 1
 
 
 def test_no_error_in_animations_and_single_frames(tmp_path: Path) -> None:

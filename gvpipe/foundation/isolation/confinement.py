@@ -21,6 +21,7 @@ import struct
 import sys
 import sysconfig
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,12 @@ RIGHTS = {1: 13, 2: 14, 3: 15, 5: 16}  # by version: how many rights of files th
 NETWORK_VERSION, NETWORK = 4, 0b11  # binding and connecting
 SYSTEM = ("/usr", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/localtime", "/proc", "/sys/devices/system", "/dev/null",
           "/dev/zero", "/dev/random", "/dev/urandom")  # fmt: skip
+
+
+@cache
+def confine_once(folder: str) -> bool:
+    """As `confine` with one folder; a process that reads a file again is confined already."""
+    return confine([folder])
 
 
 def confine(folders: Iterable[str | os.PathLike[str]]) -> bool:

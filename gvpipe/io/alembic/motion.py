@@ -29,7 +29,9 @@ class AlembicMotion:
         self.flickers = any(held.getNumSamples() > 1 for held in node.hiding)
         self.moves = self.moves or self.flickers
         self._world: Float64 | None = None  # of transforms that stand still
-        self.n_vertices = len(_sample(self._positions, 0)) if self._positions.getNumSamples() else 0
+        n_samples = self._positions.getNumSamples()
+        self.n_vertices = len(_sample(self._positions, 0)) if n_samples else 0
+        self.has_points = any(len(_sample(self._positions, number)) for number in range(n_samples))
 
     def count(self, time: float) -> int:
         """Vertices that it has at a time, seconds."""

@@ -16,6 +16,11 @@ SCOPES = {
     "vertex": "kVertexScope",
     "corner": "kFacevaryingScope",
 }
+ARRAYS = {
+    **{name: f"{name}Array" for name in ("C3f", "C4f", "V2f", "V3f", "Float")},
+    "Int32": "IntArray",
+    "N3f": "V3fArray",
+}
 
 
 def filled(kind: Any, values: Array) -> Any:
@@ -50,8 +55,7 @@ class ParamWriter:
 
     def write(self, layer: Layer) -> None:
         """Write an attribute."""
-        name, _, _ = _types(layer.kind, layer.values)
-        self._param(layer.name, name, layer, layer.indices is not None).set(self.sample(layer))
+        self.make(layer).set(self.sample(layer))
 
     def write_samples(self, name: str, kind: str, domain: str, block: Array) -> None:
         """Write the next frames ``(n, rows, C)`` of a field."""
@@ -59,7 +63,7 @@ class ParamWriter:
             layer = Layer(name, kind, domain, frame)
             param = self._params.get(name)
             if param is None:
-                param = self._param(name, _types(kind, frame)[0], layer, False)
+                param = self.make(layer)
                 param.setTimeSampling(self._sampling)
                 self._params[name] = param
             param.set(self.sample(layer))
@@ -69,7 +73,7 @@ class ParamWriter:
         import imath
         from alembic3d import AbcGeom
 
-        name, array, values = _types(layer.kind, layer.values)
+        name, array, values = param_types(layer.kind, layer.values)
         scope = getattr(AbcGeom.GeometryScope, SCOPES[layer.domain])
         kind: Any = getattr(AbcGeom, f"O{name}GeomParamSample")
         indices = layer.indices
@@ -80,13 +84,25 @@ class ParamWriter:
             return kind(made, scope)
         return kind(made, filled(imath.UnsignedIntArray, indices), scope)
 
-    def _param(self, label: str, name: str, layer: Layer, is_indexed: bool) -> Any:
+    def nothing(self, name: str, domain: str, is_indexed: bool) -> Any:
+        """A sample without values of a parameter: the library's name of its type, its domain, and whether it has indices."""
+        import imath
         from alembic3d import AbcGeom
 
+        scope = getattr(AbcGeom.GeometryScope, SCOPES[domain])
+        kind: Any = getattr(AbcGeom, f"O{name}GeomParamSample")
+        made = getattr(imath, ARRAYS[name])(0)
+        return kind(made, imath.UnsignedIntArray(0), scope) if is_indexed else kind(made, scope)
+
+    def make(self, layer: Layer) -> Any:
+        """A parameter for samples of a layer's kind."""
+        from alembic3d import AbcGeom
+
+        name = param_types(layer.kind, layer.values)[0]
         scope = getattr(AbcGeom.GeometryScope, SCOPES[layer.domain])
-        indexed = is_indexed or layer.domain == "corner"
+        indexed = layer.indices is not None or layer.domain == "corner"
         held = self._schema.getArbGeomParams()
-        param: Any = getattr(AbcGeom, f"O{name}GeomParam")(held, label.replace("/", "_"), indexed, scope, 1)
+        param: Any = getattr(AbcGeom, f"O{name}GeomParam")(held, layer.name.replace("/", "_"), indexed, scope, 1)
         return param
 
 
@@ -95,7 +111,7 @@ def is_held(kind: str, width: int) -> bool:
     return width <= 3 or (kind == "color" and width == 4)
 
 
-def _types(kind: str, values: Array) -> tuple[str, str, Array]:
+def param_types(kind: str, values: Array) -> tuple[str, str, Array]:
     """The library's name of a parameter, of the array that it takes, and the values as that array needs them."""
     width = values.shape[1]
     if kind == "color":

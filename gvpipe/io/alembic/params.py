@@ -35,13 +35,16 @@ READERS = {  # (type, components, interpretation): name of the library's class, 
 }
 
 
-def layers_of(schema: Any, polygons: SceneMesh, time: float, turn: Float64) -> tuple[tuple[Layer, ...], list[str]]:
+def layers_of(
+    schema: Any, polygons: SceneMesh, time: float, turn: Float64, last: float | None = None
+) -> tuple[tuple[Layer, ...], list[str]]:
     """Return a mesh's layers at a time, and the names of what does not fit it.
 
     Args:
         schema: of a polygon mesh or a subdivision cage.
         polygons: the same mesh, without layers.
         time: of the first frame, seconds.
+        last: time of the last frame: parameters that are the same in all frames stand still; None: no sample is compared.
         turn: ``(3, 3)`` how its directions turn into world space.
     """
     layers: list[Layer] = []
@@ -52,7 +55,7 @@ def layers_of(schema: Any, polygons: SceneMesh, time: float, turn: Float64) -> t
             layers.append(_turned(normals, turn))
     uv = _layer("uv", "uv", schema.getUVsParam(), polygons, time)
     layers.extend([uv] if uv is not None else [])
-    changing = sampled_of(schema, polygons, time)
+    changing = sampled_of(schema, polygons, time, last)
     for name, kind, param in _others(schema):
         if name in changing:
             continue
@@ -62,7 +65,7 @@ def layers_of(schema: Any, polygons: SceneMesh, time: float, turn: Float64) -> t
             name = _numbered("uv", layers)
         layer = _layer(name, kind, param, polygons, time)
         if layer is None:
-            left.append(name)
+            left.extend([name] if len(_values(param, time)) else [])  # nothing: a shot of a capture lacks it
         elif layer.domain != "constant" or kind == "color":
             layers.append(layer)
     return tuple(layers), left
@@ -81,16 +84,38 @@ def changing_normals(schema: Any) -> bool:
     return bool(param and param.valid() and param.getNumSamples() > 1 and not param.isConstant())
 
 
-def sampled_of(schema: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:
+def sampled_of(schema: Any, polygons: SceneMesh, time: float, last: float | None = None) -> dict[str, Sampled]:
     """The parameters of a mesh that change over time and can be fields: per vertex or polygon, not indexed, no uv."""
     found: dict[str, Sampled] = {}
     for label, name, kind, param in _labelled(schema):
-        if kind == "uv" or param.isIndexed() or param.getNumSamples() < 2 or param.isConstant():
+        if kind == "uv" or param.isIndexed() or not _varies(param, time, last):
             continue
         layer = _layer(name, kind, param, polygons, time)
         if layer is not None and layer.domain in ("vertex", "polygon"):
             found[label] = Sampled(Values(schema, param, layer.values.shape[1]), kind, layer.domain)
     return found
+
+
+def _varies(param: Any, time: float, last: float | None) -> bool:
+    """Whether a parameter changes; given a last time, whether it does until then."""
+    count = param.getNumSamples()
+    if count < 2 or param.isConstant():
+        return False
+    if last is None:
+        return True
+    sampling = param.getTimeSampling()
+    first, stop = sampling.getNearIndex(time, count), sampling.getNearIndex(last, count)
+    if first == stop:
+        return False
+    held = [_expanded(param, number) for number in range(first, stop + 1)]
+    return any(not np.array_equal(held[0], each) for each in held[1:])
+
+
+def _expanded(param: Any, number: int) -> Array:
+    from alembic3d import Abc
+
+    moment = float(param.getTimeSampling().getSampleTime(number))
+    return as_numbers(param.getExpandedValue(Abc.ISampleSelector(moment)).getVals())
 
 
 class Values:
@@ -106,13 +131,13 @@ class Values:
         return values if self._width == 1 else values.reshape(len(values), -1)
 
 
-def left_of(node: Node, fields: Collection[str]) -> list[str]:
+def left_of(node: Node, fields: Collection[str], time: float, last: float | None) -> list[str]:
     """What a mesh has beside positions, polygons, layers and the fields of these names, by name."""
     schema, left = node.schema, []
     uv = schema.getUVsParam()
     moving = [("uv", uv)] if uv and uv.valid() else []
     moving += [(name, param) for label, name, _, param in _labelled(schema) if label not in fields]
-    left += [f"animation of parameter {name}" for name, param in moving if param.getNumSamples() > 1 and not param.isConstant()]
+    left += [f"animation of parameter {name}" for name, param in moving if _varies(param, time, last)]
     if schema.getVelocitiesProperty().valid():
         left.append("velocities")
     taken = {name for name, _, _ in _others(schema)}
@@ -157,7 +182,7 @@ def _layer(name: str, kind: str, param: Any, polygons: SceneMesh, time: float) -
 
     value = param.getIndexedValue(Abc.ISampleSelector(time))
     values = as_numbers(value.getVals())
-    values = values.reshape(len(values), -1)
+    values = values.reshape(len(values), -1) if values.size else values
     if not values.size or (values.dtype.kind == "f" and not np.isfinite(values).all()):
         return None
     if values.dtype.kind == "f":
@@ -169,6 +194,12 @@ def _layer(name: str, kind: str, param: Any, polygons: SceneMesh, time: float) -
     rows = len(values) if indices is None else len(indices)
     sizes = {"vertex": polygons.n_vertices, "corner": len(polygons.corners), "polygon": len(polygons.counts), "constant": rows}
     return Layer(name, kind, domain, values, indices) if rows == sizes[domain] else None
+
+
+def _values(param: Any, time: float) -> Array:
+    from alembic3d import Abc
+
+    return as_numbers(param.getIndexedValue(Abc.ISampleSelector(time)).getVals())
 
 
 def _turned(normals: Layer, turn: Float64) -> Layer:

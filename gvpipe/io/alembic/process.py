@@ -22,7 +22,7 @@ def read_alembic(path: Path, options: ReadOptions) -> MeshSequence:
     """Read an archive as `gvpipe.io.alembic.reader.read_archive` does, which says what is raised."""
     if importlib.util.find_spec("alembic3d") is None:
         raise InputError(f"{path}: {EXTRA}")
-    process = LibraryProcess(path, WORKER, "Alembic", DIED)
+    process = options.keep("process", lambda: LibraryProcess(path, WORKER, "Alembic", DIED))
     process.start()
     from gvpipe.io.scene.process import read_scene  # NumPy loads here while it loads there
 

@@ -5,6 +5,7 @@ Alembic's polygons are clockwise seen from outside; here they are turned round. 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ def read_archive(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
 def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     where = str(path)
     nodes, others = find_meshes(archive)
-    motions = [motion for motion in map(AlembicMotion, nodes) if motion.n_vertices]
+    motions = [motion for motion in map(AlembicMotion, nodes) if motion.has_points]
     shown = [motion for motion in motions if not motion.is_never_shown]
     if not motions:
         held = f"; it holds {', '.join(sorted(set(others)))}" if others else ""
@@ -72,17 +73,24 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
     start = float(times[0])
     for motion in motions:
         motion.n_vertices = motion.count(start)
+    changes_at = _first_change([motion.node for motion in motions], times) if options.memory else None
+    times = times[:changes_at]
+    motions = [motion for motion in motions if motion.n_vertices]
+    if not motions:
+        raise InputError(f"{where}: no mesh has points at frame {first} (second {start:g}); leave it out (--frames)")
     frames = SceneFrames(motions, times, where, "second", first, [where])
+    frames.changes_at = None if changes_at is None else first + changes_at
     materials: list[str] = []
-    read = [_read_mesh(motion, materials, (times, where, first)) for motion in motions]
+    last = float(times[-1]) if options.memory else None
+    read = [_read_mesh(motion, materials, (times, where, first), last) for motion in motions]
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    sampled = [sampled_of(motion.node.schema, mesh, start) for motion, mesh in zip(motions, meshes, strict=True)]
+    sampled = [sampled_of(motion.node.schema, mesh, start, last) for motion, mesh in zip(motions, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     left.add_all(misfits("parameter", [*(names for _, names in read), torn]))
     for motion, own in zip(motions, sampled, strict=True):
-        left.add_all(left_of(motion.node, own if len(times) > 1 else ()))
+        left.add_all(left_of(motion.node, own if len(times) > 1 else (), start, last))
     sequence = MeshSequence(
         frames,
         joined.faces,
@@ -101,23 +109,26 @@ def _read_meshes(archive: Any, path: Path, options: ReadOptions) -> tuple[MeshSe
     return sequence, any(changing_normals(motion.node.schema) for motion in motions)
 
 
-def _read_mesh(motion: AlembicMotion, materials: list[str], frames: tuple[Float64, str, int]) -> tuple[SceneMesh, list[str]]:
+def _read_mesh(
+    motion: AlembicMotion, materials: list[str], frames: tuple[Float64, str, int], last: float | None
+) -> tuple[SceneMesh, list[str]]:
     """One mesh with its layers, and the names of parameters that were left out; new materials are added to the list.
 
     Args:
         motion, materials: what is read.
         frames: their times, the file, and the number of the first.
+        last: as of `layers_of`.
     """
     node, time = motion.node, float(frames[0][0])
     counts, corners = _polygons(node, *frames)
-    groups, names = _face_sets(node.schema, len(counts))
+    groups, names = _face_sets(node.schema, len(counts), time)
     materials.extend(name for name in names if name and name not in materials)
     bound = tuple(materials.index(name) if name else None for name in names)
     turn = motion.world(time)[:3, :3]
     is_mirrored = bool(np.linalg.det(turn) < 0)
     parent, _, name = node.path.strip("/").rpartition("/")
     plain = SceneMesh(name, parent, motion.n_vertices, counts, corners, groups, bound, not is_mirrored)
-    layers, left = layers_of(node.schema, plain, time, turn)
+    layers, left = layers_of(node.schema, plain, time, turn, last)
     return replace(plain, layers=layers), left
 
 
@@ -126,10 +137,8 @@ def _polygons(node: Node, times: Float64, where: str, start: int) -> tuple[Int64
     found = []
     for held in (node.schema.getFaceCountsProperty(), node.schema.getFaceIndicesProperty()):
         first = _integers(held, around(held, float(times[0]))[0])
-        sampling, count = held.getTimeSampling(), 1 if held.isConstant() else held.getNumSamples()
-        for number in range(1, count):
-            moment = float(sampling.getSampleTime(number))
-            if times[0] < moment <= times[-1] + 1e-6 and not np.array_equal(_integers(held, number), first):
+        for number, moment in _moments(held, times):
+            if not np.array_equal(_integers(held, number), first):
                 at = start + first_frame_of(moment, times)
                 what = f"the topology of mesh {node.path} changes at frame {at} (second {moment:g})"
                 raise TopologyChange.at(f"{where}: {what}", at, start)
@@ -141,17 +150,44 @@ def _integers(held: Any, number: int) -> Int64:
     return as_integers(sample_of(held, number))
 
 
-def _face_sets(schema: Any, n_polygons: int) -> tuple[Int64, list[str]]:
+def _first_change(nodes: list[Node], times: Float64) -> int | None:
+    """The first of some frames whose polygons are not those of the first; None: there is none."""
+    found = []
+    for node in nodes:
+        for held in (node.schema.getFaceCountsProperty(), node.schema.getFaceIndicesProperty()):
+            first = _integers(held, around(held, float(times[0]))[0])
+            for number, moment in _moments(held, times):
+                if not np.array_equal(_integers(held, number), first):
+                    found.append(first_frame_of(moment, times))
+                    break
+    return min(found, default=None)
+
+
+def _moments(held: Any, times: Float64) -> Iterator[tuple[int, float]]:
+    """Numbers and times of samples of a property behind the first frame."""
+    sampling, count = held.getTimeSampling(), 1 if held.isConstant() else held.getNumSamples()
+    for number in range(sampling.getFloorIndex(float(times[0]), count) if count > 1 else 1, count):
+        moment = float(sampling.getSampleTime(number))
+        if moment > times[-1] + 1e-6:
+            break
+        if moment > times[0]:
+            yield number, moment
+
+
+def _face_sets(schema: Any, n_polygons: int, time: float) -> tuple[Int64, list[str]]:
     """The group of each polygon, and the name of each group: 0 for polygons of no set, then one per face set.
 
     The library lists face sets by name; here they are in the order of their first polygons.
     """
+    from alembic3d import Abc
+
     sets: list[tuple[Int64, str]] = []
     for name in map(str, schema.getFaceSetNames()):
         held = schema.getFaceSet(name)  # it must outlive its schema
-        indices = as_integers(held.getSchema().getValue().getFaces())
+        indices = as_integers(held.getSchema().getValue(Abc.ISampleSelector(time)).getFaces())
         indices = indices[(indices >= 0) & (indices < n_polygons)]
-        sets.append((indices, name))
+        if len(indices) or held.getSchema().isConstant():  # a set of other shots of a capture is empty
+            sets.append((indices, name))
     groups = np.zeros(n_polygons, np.int64)
     ordered = sorted(sets, key=lambda each: int(each[0].min(initial=n_polygons)))
     for number, (indices, _) in enumerate(ordered, start=1):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gvpipe.foundation.isolation.confinement import confine
+from gvpipe.foundation.isolation.confinement import confine_once
 from gvpipe.io.alembic.reader import read_archive
 from gvpipe.io.library.worker import limited_time
 from gvpipe.io.options import ReadOptions
@@ -17,7 +17,7 @@ def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     """Read as `read_archive` does."""
     import alembic3d  # noqa: F401  its libraries load before nothing else can be opened
 
-    confine([os.path.dirname(os.path.realpath(path))])
+    confine_once(os.path.dirname(os.path.realpath(path)))
     if options.unlimited:
         return read_archive(path, options)
     with limited_time(path.stat().st_size):

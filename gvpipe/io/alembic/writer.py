@@ -7,12 +7,14 @@ sets of their names.
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gvpipe.foundation import notes
+from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import not_held
 from gvpipe.io.alembic.archive import EXTRA
@@ -20,6 +22,7 @@ from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held
 from gvpipe.io.library.writing_process import write_by
 from gvpipe.io.losses import renamed_note, shadow_note, shadowed, unit_note, wide_note
 from gvpipe.io.scene.export import ExportMesh, export_layer, export_meshes, uncovered
+from gvpipe.io.scene.mesh import Layer
 from gvpipe.io.scene.normals import SceneNormals
 from gvpipe.model.sequence import MeshSequence
 
@@ -45,6 +48,13 @@ def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]
     meshes = export_meshes(sequence, name)
     normals = SceneNormals(sequence, "Alembic")
     taken = _write_archive(sequence, meshes, normals, str(path))  # the library closes the file when its objects are gone
+    return notes_of(sequence, meshes, normals, taken)
+
+
+def notes_of(
+    sequence: MeshSequence, meshes: list[ExportMesh], normals: SceneNormals, taken: list[tuple[str, str]]
+) -> tuple[str, ...]:
+    """What Alembic cannot hold of a sequence; ``taken`` has the old and the new names of nodes whose names others had."""
     return (*normals.notes, *_notes(sequence, meshes), *_name_notes(sequence, taken))
 
 
@@ -119,9 +129,7 @@ class MeshWriter:
         self._object = tree.mesh(mesh.parent, mesh.name)  # it must outlive its schema
         self._schema = self._object.getSchema()
         self._schema.setTimeSampling(sampling)
-        starts = np.cumsum(mesh.counts) - mesh.counts
-        rank = np.arange(len(mesh.corners)) - np.repeat(starts, mesh.counts)
-        self._order = np.repeat(starts, mesh.counts) + np.where(rank > 0, np.repeat(mesh.counts, mesh.counts) - rank, 0)
+        self._order = turned_corners(mesh)
         self._params = ParamWriter(self._schema, self._order, sampling)
         self._is_first = True
 
@@ -145,23 +153,14 @@ class MeshWriter:
 
     def write_field(self, name: str, kind: str, domain: str, block: Any) -> None:
         """Write some frames ``(n, R, C)`` of a field."""
-        mesh = self._mesh
-        counts = mesh.counts.astype(np.int64) - 2
-        polygons = mesh.triangles[0] + np.cumsum(counts) - counts
-        rows = slice(*mesh.vertices) if domain == "vertex" else polygons
-        self._params.write_samples(name, kind, "vertex" if domain == "vertex" else "polygon", block[:, rows])
+        self._params.write_samples(name, kind, *field_rows(self._mesh, domain, block))
 
     def _describe(self, sample: Any) -> None:
         """Add texture coordinates and normals to the first sample, and the other attributes beside."""
-        for name, attribute in self._normals.attributes.items():
-            if name in self._normals.fields:
-                continue
-            layer = export_layer(name, attribute, self._mesh)
-            if not len(layer.values) or not is_held(layer.kind, layer.values.shape[1]):
-                continue
-            if name == "uv" and attribute.kind == "uv":
+        for layer in held_layers(self._normals, self._mesh):
+            if layer.name == layer.kind == "uv":
                 sample.setUVs(self._params.sample(layer))
-            elif name == "normal" and attribute.kind == "normal":
+            elif layer.name == layer.kind == "normal":
                 sample.setNormals(self._params.sample(layer))
             else:
                 self._params.write(layer)
@@ -170,17 +169,47 @@ class MeshWriter:
         import imath
         from alembic3d import AbcGeom
 
-        taken: set[str] = set()
-        for first, stop, material in self._mesh.groups:
-            name = self._sequence.materials[material].name if material is not None else ""
-            if not name:
-                continue
-            plain = free = name.replace("/", "_")
-            while free in taken:
-                free = f"{plain}_{len(taken)}"
-            taken.add(free)
-            faces = self._schema.createFaceSet(free)
-            faces.getSchema().set(AbcGeom.OFaceSetSchemaSample(filled(imath.IntArray, np.arange(first, stop, dtype=np.int32))))
+        for name, polygons in face_sets(self._sequence, self._mesh):
+            self._schema.createFaceSet(name).getSchema().set(AbcGeom.OFaceSetSchemaSample(filled(imath.IntArray, polygons)))
+
+
+def turned_corners(mesh: ExportMesh) -> Int64:
+    """The order of polygon corners in the file: each polygon turned round, its first corner kept."""
+    starts = np.cumsum(mesh.counts) - mesh.counts
+    rank = np.arange(len(mesh.corners)) - np.repeat(starts, mesh.counts)
+    turned = np.repeat(starts, mesh.counts) + np.where(rank > 0, np.repeat(mesh.counts, mesh.counts) - rank, 0)
+    return turned.astype(np.int64)
+
+
+def held_layers(normals: SceneNormals, mesh: ExportMesh) -> Iterator[Layer]:
+    """The attributes of a mesh that Alembic has parameters for."""
+    for name, attribute in normals.attributes.items():
+        if name not in normals.fields:
+            layer = export_layer(name, attribute, mesh)
+            if len(layer.values) and is_held(layer.kind, layer.values.shape[1]):
+                yield layer
+
+
+def field_rows(mesh: ExportMesh, domain: str, block: Array) -> tuple[str, Array]:
+    """The domain of a field in the file, and its rows ``(n, rows, C)`` on one mesh."""
+    if domain == "vertex":
+        return "vertex", block[:, slice(*mesh.vertices)]
+    counts = mesh.counts.astype(np.int64) - 2
+    return "polygon", block[:, mesh.triangles[0] + np.cumsum(counts) - counts]
+
+
+def face_sets(sequence: MeshSequence, mesh: ExportMesh) -> Iterator[tuple[str, Int32]]:
+    """A name, and numbers of polygons, of each part with a material; no two have one name."""
+    taken: set[str] = set()
+    for first, stop, material in mesh.groups:
+        name = sequence.materials[material].name if material is not None else ""
+        if not name:
+            continue
+        plain = free = name.replace("/", "_")
+        while free in taken:
+            free = f"{plain}_{len(taken)}"
+        taken.add(free)
+        yield free, np.arange(first, stop, dtype=np.int32)
 
 
 def _name_notes(sequence: MeshSequence, taken: list[tuple[str, str]]) -> tuple[str, ...]:

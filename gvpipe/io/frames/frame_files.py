@@ -31,15 +31,18 @@ class FrameFiles:
 
     Args:
         paths: the files in frame order, all of one format.
-
         start: number of the first file among all that there are, for messages.
+        until_change: whether the frames end before the first file of another connectivity.
+
+    Attributes:
+        changes_at: number of the file before which they ended; None: all are frames.
 
     Raises:
         InputError: here for the first file, when sliced for any other: unreadable, or not finite.
         TopologyChange: a file has another connectivity than the first.
     """
 
-    def __init__(self, paths: Sequence[Path], start: int = 0) -> None:
+    def __init__(self, paths: Sequence[Path], start: int = 0, until_change: bool = False) -> None:
         self.paths, self._start = list(paths), start
         self._loader: Loader = FRAME_FORMATS[self.paths[0].suffix.lower()].loader()
         self.first = load_mesh(self._loader, self.paths[0], 0)
@@ -51,6 +54,9 @@ class FrameFiles:
         self._columns: dict[
             str, tuple[Array, Spool]
         ] = {}  # numbers beside positions: the first file's, and where they are kept
+        self.changes_at: int | None = None
+        if until_change:
+            self._end_before_change()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -66,10 +72,21 @@ class FrameFiles:
                 block[i] = self._narrow(self.load(frame))
         return block
 
+    def _end_before_change(self) -> None:
+        for frame in range(1, len(self.paths)):
+            try:
+                self.load(frame)
+            except TopologyChange:
+                self.paths, self.changes_at = self.paths[:frame], self._start + frame
+                return
+
     def load(self, frame: int) -> Mesh:
         """Load one file, and keep its positions and its columns for later reads; raises `InputError`."""
         path, first_path = self.paths[frame], self.paths[0]
-        mesh = load_mesh(self._loader, path, frame)
+        try:
+            mesh = load_mesh(self._loader, path, frame)
+        except TopologyChange as exc:  # of a format without vertices, whose loader compares them
+            raise self._changed(frame, str(exc)) from exc
         for noun, here, there in (
             ("vertices", len(mesh.positions), len(self.first.positions)),
             ("triangles", len(mesh.faces), len(self.first.faces)),

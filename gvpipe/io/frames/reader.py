@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from gvpipe.foundation.notes import ASSUMED_FPS, DEFAULT_FPS, given_order
@@ -17,43 +18,28 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.model.sequence import MeshSequence
 
 
-def read_frames(
-    path: str | Sequence[str],
-    fps: float | None = None,
-    span: tuple[int, int | None] | None = None,
-    real_time: bool = False,
-    volume: bool = False,
-) -> MeshSequence:
+def read_frames(path: str | Sequence[str], options: ReadOptions) -> MeshSequence:
     """Read a folder, glob, pattern, list or single file of frames; what is static is that of the first.
 
     Args:
         path: what names the files.
-        fps: frames per second.
-        span: number of the first file that is read, and of the one after the last (None: all that follow).
-        real_time: whether files that tell their times keep that clock (`gvpipe.io.simulation.times`).
-        volume: whether what lies inside of a simulation's surface is read, too.
+        options: ``frames`` are numbers of files.
 
     Raises:
         InputError: no frames, gaps, mixed formats, or a first frame that cannot be read.
     """
-    noticed: tuple[str, ...] = ()
-    if isinstance(path, str):
-        files, name = find_frames(path), path
-        if len(files) == 1 and os.path.isfile(path):
-            noticed = sibling_note(Path(path))
-    else:
-        files, is_kept = order_list([Path(file) for file in path])
-        name = f"{files[0]} and {len(files) - 1} more"
-        noticed = (given_order(len(files)),) if is_kept else ()
-    first_file, stop = ReadOptions(frames=span).span(len(files), name)
-    if volume and {file.suffix.lower() for file in files} <= set(VOLUMES):
-        options = ReadOptions(fps, real_time=real_time, volume=True)
-        made: MeshSequence = late("simulation.step_lists", "read_volume_files")(files[first_file:stop], name, options, noticed)
+    files, name, noticed = options.keep("files", lambda: _find(path))
+    fps = options.fps
+    first_file, stop = options.span(len(files), name)
+    if options.volume and options.keep("suffixes", lambda: {file.suffix.lower() for file in files}) <= set(VOLUMES):
+        if options.memory is None:
+            files, options = files[first_file:stop], replace(options, frames=None)
+        made: MeshSequence = late("simulation.step_lists", "read_volume_files")(files, name, options, noticed)
         return made
-    frames = FrameFiles(files[first_file:stop], first_file)
+    frames = FrameFiles(files[first_file:stop], first_file, options.memory is not None)
     first = frames.first
     columns = split_columns(frames)
-    later = changing_looks(first, files[first_file:stop])
+    later = changing_looks(first, frames.paths)
     frames.forget_animated()
     if fps is None and len(files) > 1:
         noticed = (*noticed, ASSUMED_FPS)
@@ -74,4 +60,13 @@ def read_frames(
         tuple(dict.fromkeys([*first.not_carried, *columns.not_carried, *later])),
     )
     timed = FRAME_FORMATS[frames.paths[0].suffix.lower()].timed
-    return sequence if timed is None or len(frames.paths) < 2 else timed(sequence, frames.paths, fps, real_time)
+    return sequence if timed is None or len(frames.paths) < 2 else timed(sequence, frames.paths, fps, options.real_time)
+
+
+def _find(path: str | Sequence[str]) -> tuple[list[Path], str, tuple[str, ...]]:
+    """The files, their common name, and notes."""
+    if isinstance(path, str):
+        files = find_frames(path)
+        return files, path, sibling_note(Path(path)) if len(files) == 1 and os.path.isfile(path) else ()
+    files, is_kept = order_list([Path(file) for file in path])
+    return files, f"{files[0]} and {len(files) - 1} more", (given_order(len(files)),) if is_kept else ()

@@ -19,7 +19,7 @@ from gvpipe.model.sequence import CHUNK_BYTES, MeshSequence
 DEFAULT_PATTERN = "%04d.obj"
 
 
-def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str, ...]:
+def write_frames(sequence: MeshSequence, path: str, start: int = 0, looks: int = 0) -> tuple[str, ...]:
     """Write one file per frame, numbered from ``start``, each as a whole or not at all, and what all share beside them.
 
     Returns what the format cannot hold, a line each.
@@ -27,6 +27,8 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
     Args:
         path: a pattern (``out/%04d.obj``, its folder is created), a folder (``%04d.obj`` in it), or for a sequence of
             one frame the file itself.
+        start: number of the first file.
+        looks: number of the materials, where other frames of the series have others: it goes into the name of their file.
 
     Raises:
         InputError: not such a path, an unknown or read-only format, a negative start.
@@ -50,7 +52,8 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0) -> tuple[str
             f"{path} would hold one frame of {sequence.n_frames}; give a pattern such as "
             f"{target.with_name(target.stem + '_%04d' + target.suffix)}"
         )
-    encoder = entry.encoder(sequence, _shared_name(pattern.before if pattern else target.stem))
+    shared = _shared_name(pattern.before if pattern else target.stem)
+    encoder = entry.encoder(sequence, f"{shared}_{looks}" if looks else shared)
     made = _Made(target.parent)
     try:
         if pattern is not None:

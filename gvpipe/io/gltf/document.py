@@ -77,10 +77,13 @@ class Document:
     chunk: memoryview
     budget: Budget
     _buffers: dict[int, memoryview] = field(default_factory=dict)
+    _items: dict[str, list[Json]] = field(default_factory=dict)  # lists that were checked
 
     def items(self, kind: str) -> list[Json]:
         """The objects of one kind, such as ``"nodes"``."""
-        return objects(self.tree, kind, "the file")
+        if kind not in self._items:
+            self._items[kind] = objects(self.tree, kind, "the file")
+        return self._items[kind]
 
     def item(self, kind: str, number: int) -> tuple[Json, str]:
         """One object and its name for messages; raises `ValueError` if there is none of that number."""

@@ -20,6 +20,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from gvpipe.asset.material import Image
 from gvpipe.foundation.arrays import Array, UInt8
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError
@@ -52,6 +53,7 @@ class Glb:
     def __init__(self, is_packed: bool = False) -> None:
         self.is_packed = is_packed
         self.tree: Json = {"asset": {"version": "2.0", "generator": "gvpipe"}, "accessors": [], "bufferViews": []}
+        self.images: dict[Image, tuple[int, str]] = {}  # numbers and media types of those that are there
         self._stream: IO[bytes] = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by `close`
         self._size = 0
         self._unpacked = 0  # bytes of compressed views, once decoded

@@ -21,26 +21,33 @@ LINEAR, NEAREST_MIPMAP, LINEAR_MIPMAP = 9729, 9984, 9987
 WRAP_NUMBERS = {name: number for number, name in WRAPS.items()}
 
 
-def write_materials(glb: Glb, materials: tuple[Material, ...], images: tuple[Image, ...], uv_sets: Mapping[str, int]) -> None:
-    """Add materials and the images that they show.
+def write_materials(
+    glb: Glb, materials: tuple[Material, ...], images: tuple[Image, ...], uv_sets: Mapping[str, int]
+) -> list[int]:
+    """Add materials and the images that they show, but those that an earlier call added; return the materials' numbers.
 
     Args:
         glb: the file.
         materials, images: of the sequence.
         uv_sets: number of each attribute of texture coordinates; textures without one are left out.
     """
-    types = [_write_image(glb, image) for image in images]
+    known = dict(glb.images)
+    held = [known[image] if image in known else _write_image(glb, image) for image in images]
+    glb.images |= dict(zip(images, held, strict=True))
+    before = list(glb.tree.get("materials", []))
+    numbers = []
     for material in materials:
-        glb.append("materials", _material(glb, material, types, uv_sets))
+        made = _material(glb, material, held, uv_sets)
+        numbers.append(before.index(made) if made in before else glb.append("materials", made))
+    return numbers
 
 
-def _write_image(glb: Glb, image: Image) -> str:
-    """Add an image and return its media type."""
+def _write_image(glb: Glb, image: Image) -> tuple[int, str]:
+    """Add an image and return its number and its media type."""
     data, kind = image.data, image.media_type
     if kind not in CORE and kind not in EXTENSIONS:
         data, kind = _as_png(image), "image/png"
-    glb.append("images", {"name": image.name, "mimeType": kind, "bufferView": glb.view(data)})
-    return kind
+    return glb.append("images", {"name": image.name, "mimeType": kind, "bufferView": glb.view(data)}), kind
 
 
 def _as_png(image: Image) -> bytes:
@@ -52,11 +59,11 @@ def _as_png(image: Image) -> bytes:
         return file.getvalue()
 
 
-def _material(glb: Glb, material: Material, types: list[str], uv_sets: Mapping[str, int]) -> Json:
+def _material(glb: Glb, material: Material, images: list[tuple[int, str]], uv_sets: Mapping[str, int]) -> Json:
     def info(texture: Texture | None, scale: str = "") -> Json:
         if texture is None or texture.uv not in uv_sets:
             return {}
-        return _texture_info(glb, texture, types[texture.image], uv_sets[texture.uv]) | (
+        return _texture_info(glb, texture, images[texture.image], uv_sets[texture.uv]) | (
             {scale: texture.scale} if scale and texture.scale != 1 else {}
         )
 
@@ -108,7 +115,8 @@ def _layers(material: Material, info: Callable[[Texture | None, str], Json]) -> 
     return found
 
 
-def _texture_info(glb: Glb, texture: Texture, kind: str, uv_set: int) -> Json:
+def _texture_info(glb: Glb, texture: Texture, image: tuple[int, str], uv_set: int) -> Json:
+    number, kind = image
     is_nearest = texture.filter == "nearest"
     sampler = {
         "magFilter": NEAREST if is_nearest else LINEAR,
@@ -120,9 +128,9 @@ def _texture_info(glb: Glb, texture: Texture, kind: str, uv_set: int) -> Json:
     item: Json = {"sampler": _once(glb, "samplers", sampler)}
     if extension:
         glb.use(extension, is_required=True)
-        item["extensions"] = {extension: {"source": texture.image}}
+        item["extensions"] = {extension: {"source": number}}
     else:
-        item["source"] = texture.image
+        item["source"] = number
     info: Json = {"index": _once(glb, "textures", item)}
     info |= {"texCoord": uv_set} if uv_set else {}
     place: Json = {}

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.asset.attribute import guess_kind
-from gvpipe.foundation.arrays import Array, Float32, Float64, Floats, Int64
+from gvpipe.foundation.arrays import Array, Float32, Float64, Floats
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import DEFAULT_FPS
 from gvpipe.io.damage import reading
@@ -21,8 +21,9 @@ from gvpipe.io.gltf.clips import Clip, clip_names, clip_times, key_rate
 from gvpipe.io.gltf.document import load_document
 from gvpipe.io.gltf.json_fields import rounded_up
 from gvpipe.io.gltf.poses import Poses
-from gvpipe.io.gltf.scene import Scene, read_scene
+from gvpipe.io.gltf.scene import OpenScene, Scene, open_scene, read_scene
 from gvpipe.io.gltf.scene_attributes import attribute_names, scene_attributes
+from gvpipe.io.gltf.turns import find_turns
 from gvpipe.io.mesh import FrameValues, Mesh
 from gvpipe.io.options import NO_OPTIONS, ReadOptions
 from gvpipe.model.origin import choose_origin
@@ -88,32 +89,36 @@ def _values(attributes: Callable[[], dict[str, Array]], name: str) -> FrameValue
 class ClipFrames:
     """Positions ``(F, V, 3)`` of a clip, evaluated as they are sliced.
 
-    A frame within `NEAR_KEY` frames of a key shows that key: times of keys are float32, those of frames are not.
-
     Args:
         poses: the scene.
         clip: what moves it.
-        fps: frames per second.
+        times: ``(F,)`` of the frames, seconds (`times_of`).
         dtype: float32, or float64 if positions need an origin.
+        changes_at: number of the frame before which these ended, where other meshes are shown; None: there is none.
     """
 
-    def __init__(self, poses: Poses, clip: Clip, fps: float, dtype: type[np.floating]) -> None:
-        self._poses, self._clip, self._fps, self._keys = poses, clip, fps, clip.keys
+    def __init__(self, poses: Poses, times: Float64, dtype: type[np.floating], changes_at: int | None = None) -> None:
+        self._poses, self._times, self.changes_at = poses, times, changes_at
         self.dtype = np.dtype(dtype)
-        self.shape: tuple[int, ...] = (frame_count(clip, fps), poses.n_vertices, 3)
+        self.shape: tuple[int, ...] = (len(times), poses.n_vertices, 3)
 
     def __getitem__(self, key: slice, /) -> Floats:
-        frames = np.arange(*key.indices(self.shape[0]))
         with np.errstate(over="ignore"):  # refused later
-            return self._poses.at(self._times(frames)).astype(self.dtype, copy=False)
+            return self._poses.at(self._times[key]).astype(self.dtype, copy=False)
 
-    def _times(self, frames: Int64) -> Float64:
-        times = np.minimum(self._clip.start + frames / self._fps, self._clip.stop)
-        after = np.clip(np.searchsorted(self._keys, times), 1, max(1, len(self._keys) - 1))
-        for index in (after - 1, np.minimum(after, len(self._keys) - 1)):
-            keys = self._keys[index]
-            times = np.where(np.abs(keys - times) * self._fps < NEAR_KEY, keys, times)
-        return times
+
+def times_of(clip: Clip, fps: float) -> Float64:
+    """Seconds ``(F,)`` of the frames of a clip.
+
+    A frame within `NEAR_KEY` frames of a key shows that key: times of keys are float32, those of frames are not.
+    """
+    every = clip.keys
+    times = np.minimum(clip.start + np.arange(frame_count(clip, fps)) / fps, clip.stop)
+    after = np.clip(np.searchsorted(every, times), 1, max(1, len(every) - 1))
+    for index in (after - 1, np.minimum(after, len(every) - 1)):
+        keys = every[index]
+        times = np.where(np.abs(keys - times) * fps < NEAR_KEY, keys, times)
+    return np.asarray(times)
 
 
 def frame_count(clip: Clip, fps: float) -> int:
@@ -132,11 +137,12 @@ def read_animated(path: Path, options: ReadOptions = NO_OPTIONS) -> MeshSequence
         InputError: it cannot be read, or has no such clip.
     """
     with reading(path, path.suffix[1:].upper()):
-        document = load_document(path)
-        names = clip_names(document)
+        document = options.keep("document", lambda: load_document(path))
+        names = options.keep("names", lambda: clip_names(document))
         if not names and options.clip is None:
             return None
-        return _sequence(path, read_scene(document, options.clip), options.fps, names)
+        opened = options.keep("scene", lambda: open_scene(document, options.clip))
+        return _sequence(path, opened, options, names)
 
 
 def read_clips(path: Path) -> list[tuple[str, float, float]]:
@@ -152,18 +158,19 @@ def read_poses(path: Path, clip: str | None = None) -> Poses:
     return read_scene(document, clip or None, is_still=clip == "" or not clip_names(document)).poses
 
 
-def _sequence(path: Path, scene: Scene, fps: float | None, names: list[str]) -> MeshSequence:
-    rate, note = (fps, ()) if fps is not None else _choose_rate(scene.clip)
+def _sequence(path: Path, opened: OpenScene, options: ReadOptions, names: list[str]) -> MeshSequence:
+    rate, note = (options.fps, ()) if options.fps is not None else _choose_rate(opened.clip)
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{path}: fps is {rate}; a number above 0 is needed")
-    n_frames = frame_count(scene.clip, rate)
+    n_frames = frame_count(opened.clip, rate)
     if n_frames > MAX_FRAMES:
         raise InputError(f"{path} would have {n_frames} frames at {rate:g} per second; at most {MAX_FRAMES}, so lower fps")
-    first: Float64 = scene.poses.at(np.array([scene.clip.start]))
+    scene, times, changes_at = _chosen(path, opened, options, rate)
+    first: Float64 = scene.poses.at(times[:1])
     with np.errstate(over="ignore"):
         small: Float32 = first.astype(np.float32)
     needs_origin = bool(np.isfinite(small).all() and choose_origin(first).any())
-    frames = ClipFrames(scene.poses, scene.clip, rate, np.float64 if needs_origin else np.float32)
+    frames = ClipFrames(scene.poses, times, np.float64 if needs_origin else np.float32, changes_at)
     others = [name for name in names if name != scene.clip.name]
     if others:
         listed = ", ".join(others[:8]) + (f" and {len(others) - 8} more" if len(others) > 8 else "")
@@ -181,6 +188,21 @@ def _sequence(path: Path, scene: Scene, fps: float | None, names: list[str]) -> 
         metadata=scene.metadata,
         not_carried=scene.not_carried,
     )
+
+
+def _chosen(path: Path, opened: OpenScene, options: ReadOptions, rate: float) -> tuple[Scene, Float64, int | None]:
+    """The scene, the times of its frames, and the frame before which those end, where other meshes take their turn."""
+    times = options.keep("times", lambda: times_of(opened.clip, rate))
+    if options.memory is None:
+        return opened.all(), times, None
+    first, stop = options.span(len(times), str(path))
+    nodes = [each.node for each in opened.shown]
+    turns = options.keep("turns", lambda: find_turns(opened.nodes, opened.clip, nodes, times))
+    if turns is None:
+        return options.keep("whole", opened.all), times[first:stop], None
+    end = turns.run(first, stop)
+    own = [number for number, group in enumerate(turns.groups) if group == turns.shown[first]]
+    return opened.some(own, float(times[first])), times[first:end], end if end < stop else None
 
 
 def _choose_rate(clip: Clip) -> tuple[float, tuple[str, ...]]:

@@ -7,7 +7,9 @@ nodes show has vertices for each of them.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +28,7 @@ from gvpipe.io.gltf.materials import Looks, read_materials
 from gvpipe.io.gltf.nodes import Nodes, read_nodes, scene_order
 from gvpipe.io.gltf.poses import Placed, Poses, find_hidden
 from gvpipe.io.gltf.skins import Skin, read_skin
+from gvpipe.io.gltf.used_looks import used_looks
 from gvpipe.io.gltf.vectors import handedness
 from gvpipe.io.scene.hiding import hidden_note
 
@@ -39,7 +42,7 @@ class Scene:
         clip: what moves it.
         faces: ``(T, 3)``.
         placed: its blocks of vertices.
-        linear: what turns each block's vectors at the clip's start.
+        linear: what turns each block's vectors at the first frame.
         parts, materials, images, metadata, notes, not_carried: as in `MeshSequence`.
     """
 
@@ -66,6 +69,55 @@ class Shown:
 
 
 def read_scene(document: Document, clip: str | None = None, is_still: bool = False, moving_alone: bool = False) -> Scene:
+    """Read the scene that a file shows, all of it: see `open_scene`."""
+    return open_scene(document, clip, is_still, moving_alone).all()
+
+
+@dataclass(frozen=True, eq=False)
+class OpenScene:
+    """What a file shows before it is put together.
+
+    Args:
+        document, nodes, clip: of the file.
+        shown: the meshes.
+        moving_alone: as of `open_scene`.
+    """
+
+    document: Document
+    nodes: Nodes
+    clip: Clip
+    shown: list[Shown]
+    moving_alone: bool
+
+    @cached_property
+    def looks(self) -> Looks:
+        """All materials and images."""
+        return Looks((), (), ()) if self.moving_alone else read_materials(self.document)
+
+    @cached_property
+    def left(self) -> tuple[str, ...]:
+        """What is not carried, by name."""
+        in_scene = set(scene_order(self.document, self.nodes))
+        return () if self.moving_alone else left_behind(self.document, in_scene)
+
+    def all(self) -> Scene:
+        """The scene of all meshes, at the clip's start; raises `ValueError`."""
+        nodes, clip = self.nodes, self.clip
+        visible, hiding = _without_hidden(nodes, clip, self.shown)
+        if not visible:  # a file that shows nothing shows all
+            curves = {key: curve for key, curve in clip.curves.items() if key[1] != "visible"}
+            nodes, clip = replace(nodes, visible=np.ones_like(nodes.visible)), replace(clip, curves=curves)
+        return _joined(self, nodes, clip, visible or self.shown, hiding, clip.start)
+
+    def some(self, numbers: Collection[int], time: float) -> Scene:
+        """The scene of some meshes at a time; raises `ValueError`."""
+        kept = _placed_anew([self.shown[number] for number in numbers])
+        scene = _joined(self, self.nodes, self.clip, kept, (), time)
+        parts, materials, images = used_looks(scene.parts, scene.materials, scene.images)
+        return replace(scene, parts=parts, materials=materials, images=images)
+
+
+def open_scene(document: Document, clip: str | None = None, is_still: bool = False, moving_alone: bool = False) -> OpenScene:
     """Read the scene that a file shows.
 
     Args:
@@ -85,18 +137,19 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
         counts = {one.node: len(one.block.morphs) for each in shown for one in each.placed}
         number = find_clip(document, clip)
         moves = read_clip(accessors, number, counts)
-    visible, hiding = _without_hidden(nodes, moves, shown)
-    if not visible:  # a file that shows nothing shows all
-        curves = {key: curve for key, curve in moves.curves.items() if key[1] != "visible"}
-        nodes, moves = replace(nodes, visible=np.ones_like(nodes.visible)), replace(moves, curves=curves)
-    shown = visible or shown
+    return OpenScene(document, nodes, moves, shown, moving_alone)
+
+
+def _joined(opened: OpenScene, nodes: Nodes, moves: Clip, shown: list[Shown], hiding: tuple[str, ...], time: float) -> Scene:
+    """The scene of some meshes, its vectors as at a time."""
+    document, moving_alone = opened.document, opened.moving_alone
     placed = [one for each in shown for one in each.placed]
     poses = Poses(nodes, moves, placed)
-    linear = poses.linear(moves.start)
+    linear = poses.linear(time)
     faces, parts = _triangles(nodes, shown, linear)
     if not len(faces):
         raise ValueError("its meshes have no triangles")
-    looks = Looks((), (), ()) if moving_alone else read_materials(document)
+    looks = opened.looks
     return Scene(
         poses,
         moves,
@@ -106,9 +159,9 @@ def read_scene(document: Document, clip: str | None = None, is_still: bool = Fal
         parts,
         looks.materials,
         looks.images,
-        NO_METADATA if moving_alone else _metadata(document, moves.name, moves.start),
+        NO_METADATA if moving_alone else _metadata(document, moves.name, time),
         () if moving_alone else (*hiding, *looks.notes),
-        () if moving_alone else left_behind(document, set(scene_order(document, nodes))),
+        opened.left,
     )
 
 
@@ -154,6 +207,14 @@ def _without_hidden(nodes: Nodes, clip: Clip, shown: list[Shown]) -> tuple[list[
     kept = [each for each, span in zip(shown, spans, strict=True) if not span.all()]
     if not kept:
         return [], ("all of its meshes are hidden; they were read as they are",)
+    result = _placed_anew(kept)
+    n_left, n_passing = len(shown) - len(kept), sum(bool(span.any()) and not span.all() for span in spans)
+    left = (f"{n_left} of {len(shown)} meshes are hidden; they were left out",) if n_left else ()
+    return result, (*left, *hidden_note(n_passing))
+
+
+def _placed_anew(kept: list[Shown]) -> list[Shown]:
+    """Some of the meshes, their vertices numbered from 0."""
     result, start = [], 0
     for each in kept:
         placed = []
@@ -161,9 +222,7 @@ def _without_hidden(nodes: Nodes, clip: Clip, shown: list[Shown]) -> tuple[list[
             placed.append(replace(one, start=start))
             start += len(one.block.positions)
         result.append(replace(each, placed=tuple(placed)))
-    n_left, n_passing = len(shown) - len(kept), sum(bool(span.any()) and not span.all() for span in spans)
-    left = (f"{n_left} of {len(shown)} meshes are hidden; they were left out",) if n_left else ()
-    return result, (*left, *hidden_note(n_passing))
+    return result
 
 
 def _triangles(nodes: Nodes, shown: list[Shown], linear: list[Float64]) -> tuple[Int32, tuple[Part, ...]]:

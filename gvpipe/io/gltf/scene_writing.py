@@ -114,7 +114,7 @@ def write_scene(
         step: how far off packed positions may be; 0: not at all.
     """
     sequence = prepared.sequence
-    write_materials(glb, sequence.materials, sequence.images, prepared.uv_sets)
+    numbers = write_materials(glb, sequence.materials, sequence.images, prepared.uv_sets)
     written: list[Written] = []
     roots: list[int] = []
     last_parent = ""
@@ -122,7 +122,7 @@ def write_scene(
     if positions.dtype != np.float32 or (glb.is_packed and any(map(needs_extension, attributes))):
         glb.use(EXTENSION, is_required=True)
     for shape in prepared.split.shapes:
-        mesh = _write_mesh(glb, shape, positions, attributes, step)
+        mesh = _write_mesh(glb, shape, positions, attributes, step, numbers)
         node = glb.append("nodes", {"mesh": mesh} | ({"name": shape.name} if shape.name else {}))
         written.append(Written(node, mesh, shape))
         if is_skinned or not shape.parent:
@@ -141,7 +141,9 @@ def write_scene(
     return written
 
 
-def _write_mesh(glb: Glb, shape: Shape, positions: Array, attributes: tuple[GltfAttribute, ...], step: float) -> int:
+def _write_mesh(
+    glb: Glb, shape: Shape, positions: Array, attributes: tuple[GltfAttribute, ...], step: float, materials: list[int]
+) -> int:
     own_positions = positions[shape.start : shape.stop]
     filtered = steps_of(own_positions, step) if step and glb.is_packed else None
     accessors = {"POSITION": glb.array(own_positions, VERTICES, bounds=True, filtered=filtered)}
@@ -153,7 +155,7 @@ def _write_mesh(glb: Glb, shape: Shape, positions: Array, attributes: tuple[Gltf
         small = shape.stop - shape.start < 65536  # the largest number of a type is no vertex
         corners = faces.reshape(-1, 1).astype(np.uint16 if small else np.uint32)
         item: Json = {"attributes": accessors, "indices": glb.array(corners, INDICES)}
-        primitives.append(item | ({} if material is None else {"material": material}))
+        primitives.append(item | ({} if material is None else {"material": materials[material]}))
     return glb.append("meshes", {"primitives": primitives} | ({"name": shape.name} if shape.name else {}))
 
 

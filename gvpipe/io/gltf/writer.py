@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Float32
+from gvpipe.foundation.arrays import Array, Float32, Float64
 from gvpipe.io.gltf.clips import FPS
 from gvpipe.io.gltf.glb import Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
@@ -69,11 +69,11 @@ def write_animated(sequence: MeshSequence, path: Path, is_packed: bool = False) 
     prepared = prepare(sequence, is_packed=is_packed)
     with glb_at(path, is_packed) as glb:
         n_targets = _write_animation(glb, prepared)
-    return (*prepared.notes, *_animation_notes(n_targets))
+    return (*prepared.notes, *animation_notes(n_targets))
 
 
 @dataclass(eq=False)
-class _Targets:
+class Targets:
     """Morph targets of a mesh: their accessors by attribute, and the one of each frame, -1 for none.
 
     Args:
@@ -102,14 +102,22 @@ class _Targets:
 
 def _write_animation(glb: Glb, prepared: Prepared) -> int:
     """Add the scene and its animation; returns the largest number of morph targets of a mesh."""
+    moving = write_moving(glb, prepared)
+    if prepared.sequence.n_frames > 1:
+        _write_channels(glb, prepared.sequence, moving)
+    return most_targets(moving)
+
+
+def write_moving(glb: Glb, prepared: Prepared) -> list[Targets]:
+    """Add the scene and its morph targets; returns those of the meshes that move."""
     sequence, sources = prepared.sequence, prepared.split.sources
     first = sequence.read(0, 1)[0]
     base, normals = first[sources], normals_of(prepared, 0, first)
     step = EXACT / 2 * extent_of(first)  # of the base and of what targets add to it
     scene = write_scene(glb, prepared, base, () if normals is None else (normals,), step=step)
     if sequence.n_frames == 1:
-        return 0
-    targets = [_Targets(one, step) for one in scene]
+        return []
+    targets = [Targets(one, step) for one in scene]
     for start, block in sequence.chunks():
         for i, frame in enumerate(block):
             deltas = {"POSITION": frame[sources] - base}
@@ -121,37 +129,58 @@ def _write_animation(glb: Glb, prepared: Prepared) -> int:
             for one in targets:
                 one.add(glb, deltas)
     moving = [one for one in targets if one.accessors]
-    _write_channels(glb, sequence, moving)
     for one in moving:
         mesh = glb.tree["meshes"][one.written.mesh]
         mesh["weights"] = [0] * len(one.accessors)
         for primitive in mesh["primitives"]:
             primitive["targets"] = one.accessors
+    return moving
+
+
+def most_targets(moving: list[Targets]) -> int:
+    """The largest number of morph targets of a mesh."""
     return max((len(one.accessors) for one in moving), default=0)
 
 
-def _write_channels(glb: Glb, sequence: MeshSequence, moving: list[_Targets]) -> None:
-    """Add the animation of the weights; a scene without movement has one of its first node, which says how long it is."""
-    times = (np.arange(sequence.n_frames) / sequence.fps).astype(np.float32)[:, None]
-    if moving:
-        time = glb.array(times, bounds=True)
-        samplers = [{"input": time, "output": _write_weights(glb, one), "interpolation": "LINEAR"} for one in moving]
-        targets: list[Json] = [{"node": one.written.node, "path": "weights"} for one in moving]
-    else:
-        root = glb.tree["scenes"][0]["nodes"][0]
-        place = np.array([glb.tree["nodes"][root].get("translation", [0, 0, 0])] * 2, np.float32)
-        samplers = [{"input": glb.array(times[[0, -1]], bounds=True), "output": glb.array(place), "interpolation": "STEP"}]
-        targets = [{"node": root, "path": "translation"}]
+def weight_channels(glb: Glb, moving: list[Targets], times: Float64) -> list[tuple[Json, Json]]:
+    """A sampler and a target for the weights of each moving mesh, given the seconds ``(F,)`` of its frames."""
+    if not moving:
+        return []
+    time = glb.array(times.astype(np.float32)[:, None], bounds=True)
+    return [
+        (
+            {"input": time, "output": _write_weights(glb, one), "interpolation": "LINEAR"},
+            {"node": one.written.node, "path": "weights"},
+        )
+        for one in moving
+    ]
+
+
+def write_animation(glb: Glb, sequence: MeshSequence, channels: list[tuple[Json, Json]]) -> None:
+    """Add the animation, named as that which the sequence was read from."""
     animation = {
         "name": sequence.metadata.texts.get("clip") or "animation",
-        "samplers": samplers,
-        "channels": [{"sampler": i, "target": target} for i, target in enumerate(targets)],
+        "samplers": [sampler for sampler, _ in channels],
+        "channels": [{"sampler": i, "target": target} for i, (_, target) in enumerate(channels)],
         "extras": {FPS: sequence.fps},
     }
     glb.append("animations", animation)
 
 
-def _write_weights(glb: Glb, targets: _Targets) -> int:
+def _write_channels(glb: Glb, sequence: MeshSequence, moving: list[Targets]) -> None:
+    """Add the animation of the weights; a scene without movement has one of its first node, which says how long it is."""
+    times = np.arange(sequence.n_frames) / sequence.fps
+    channels = weight_channels(glb, moving, times)
+    if not moving:
+        root = glb.tree["scenes"][0]["nodes"][0]
+        place = np.array([glb.tree["nodes"][root].get("translation", [0, 0, 0])] * 2, np.float32)
+        ends = glb.array(times[[0, -1]].astype(np.float32)[:, None], bounds=True)
+        sampler: Json = {"input": ends, "output": glb.array(place), "interpolation": "STEP"}
+        channels = [(sampler, {"node": root, "path": "translation"})]
+    write_animation(glb, sequence, channels)
+
+
+def _write_weights(glb: Glb, targets: Targets) -> int:
     """The weights of all targets in all frames, one after the other: ``(F M, 1)``, zeros but for one a frame."""
     frames = np.array(targets.frames)
     shown = np.flatnonzero(frames >= 0)
@@ -160,7 +189,8 @@ def _write_weights(glb: Glb, targets: _Targets) -> int:
     return glb.sparse(np.ones((len(places), 1), np.float32), places, (len(frames) * n_targets, 1))
 
 
-def _animation_notes(n_targets: int) -> tuple[str, ...]:
+def animation_notes(n_targets: int) -> tuple[str, ...]:
+    """What viewers cannot show."""
     if n_targets <= MANY_TARGETS:
         return ()
     return (f"it has {n_targets} morph targets; many viewers show at most {MANY_TARGETS}",)

@@ -21,15 +21,18 @@ from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.atomic import atomic_path
 from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.io.library import process as library_process
-from gvpipe.io.library.writing_worker import ASK, CELLS, DONE, EXACT, INPUT, POSITIONS, Asked
+from gvpipe.io.library.writing_worker import ASK, CELLS, DONE, EXACT, INPUT, POSITIONS, SHOT, Asked, AskedShots
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 WORKER = "gvpipe.io.library.writing_worker"
 LITTLE_SPACE = 1 << 20  # bytes that are left on a disk that counts as full
 
 
-def write_by(module: str, function: str, sequence: MeshSequence, path: Path) -> tuple[str, ...]:
+def write_by(module: str, function: str, given: MeshSequence | Capture, path: Path) -> tuple[str, ...]:
     """Write a file by ``function(sequence, temporary path, name)`` of a module, in a process of its own.
+
+    For a capture the function gets `gvpipe.io.library.writing_worker.AskedShots`.
 
     The name is the file's, without folder and extension. Returns what the function returns.
 
@@ -41,7 +44,7 @@ def write_by(module: str, function: str, sequence: MeshSequence, path: Path) -> 
         process = library_process.start_process(WORKER, path)
         assert process.stdin is not None and process.stdout is not None  # they are pipes
         try:
-            state, result = _serve(process, (module, function, _without_frames(sequence), temporary, path), sequence)
+            state, result = _serve(process, (module, function, temporary, path), given)
         except (EOFError, OSError, pickle.UnpicklingError) as exc:
             raise OutputError(f"cannot write {path}: {_why(path)}") from exc
         finally:
@@ -56,15 +59,26 @@ def write_by(module: str, function: str, sequence: MeshSequence, path: Path) -> 
     return notes
 
 
-def _serve(process: Any, request: Any, sequence: MeshSequence) -> tuple[str, Any]:
+def _serve(process: Any, order: tuple[str, str, Path, Path], given: MeshSequence | Capture) -> tuple[str, Any]:
     """Answer what the process asks until it says how it ended."""
+    module, function, temporary, path = order
+    head: Any
+    if isinstance(given, MeshSequence):
+        sequence, head = given, _without_frames(given)
+    else:
+        sequence, head = given.shots[0], AskedShots(given.lengths, given.fps)
+    request: Any = (module, function, head, temporary, path)
     while True:
         pickle.dump(request, process.stdin, protocol=5)
         process.stdin.flush()
-        state, *given = pickle.load(process.stdout)
+        state, *asked = pickle.load(process.stdout)
         if state != ASK:
-            return state, given[0]
-        request = _frames(sequence, *given)
+            return state, asked[0]
+        if asked[0] == SHOT and isinstance(given, Capture):
+            sequence = given.shots[asked[1]]  # frames that are asked for from now on are its own
+            request = _without_frames(sequence)
+        else:
+            request = _frames(sequence, *asked)
 
 
 def _frames(sequence: MeshSequence, what: str, start: int, stop: int) -> Array:

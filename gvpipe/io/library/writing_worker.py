@@ -9,14 +9,18 @@ import importlib
 import os
 import pickle
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from gvpipe.foundation.atomic import output_error
 from gvpipe.foundation.errors import GvpipeError, InputError
 
+if TYPE_CHECKING:
+    from gvpipe.model.sequence import MeshSequence
+
 ASK, DONE, INPUT, OUTPUT = "ask", "done", "input", "output"
-POSITIONS, EXACT, CELLS = ".positions", ".exact", ".cells."  # no names of fields that any reader makes
+POSITIONS, EXACT, CELLS, SHOT = ".positions", ".exact", ".cells.", ".shot"  # no names of fields that any reader makes
 _answers: list[IO[bytes]] = []  # to the process that started this one
 
 
@@ -32,6 +36,24 @@ class Asked:
         start, stop, _ = key.indices(self.shape[0])
         _send(ASK, self.what, start, stop)
         return pickle.load(sys.stdin.buffer)
+
+
+@dataclass(frozen=True)
+class AskedShots:
+    """The shots of a capture that the other process has. Frames can be read of the shot alone that was asked for last.
+
+    Args:
+        lengths: frames of each.
+        fps: of all.
+    """
+
+    lengths: tuple[int, ...]
+    fps: float
+
+    def __iter__(self) -> Iterator[MeshSequence]:
+        for number in range(len(self.lengths)):
+            _send(ASK, SHOT, number, number + 1)
+            yield pickle.load(sys.stdin.buffer)
 
 
 def main() -> None:

@@ -27,6 +27,7 @@ class Described:
     """A sequence without its positions and the values of its fields; see `gvpipe.MeshSequence`.
 
     Args:
+        changes_at: frame of the file before which the sequence ended, where vertices or triangles change.
         moves_normals: whether the file's normals change; the note about them needs what takes long to import.
     """
 
@@ -45,3 +46,4 @@ class Described:
     not_carried: tuple[str, ...]
     rounding: float
     moves_normals: bool
+    changes_at: int | None

@@ -52,6 +52,9 @@ class SceneFrames:
         start: number of the first frame among all that the file has.
         files: that the library has mapped into memory.
 
+    Attributes:
+        changes_at: number of the frame before which these ended, where vertices or triangles change; None: there is none.
+
     Raises:
         InputError: here for the first frame, when sliced for any other: a coordinate that is not finite.
         TopologyChange: a mesh has another number of vertices than at first.
@@ -72,6 +75,7 @@ class SceneFrames:
         self._starts = np.cumsum([0, *(motion.n_vertices for motion in motions)])
         self._lock = ForkLock()  # neither library says that its Python objects may be shared by threads
         self._still: list[Array | None] = [None] * len(self._motions)
+        self.changes_at: int | None = None
         self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
         self.first: Float64 = self._evaluate(0)
         check_finite(self.first[None], where)

@@ -6,6 +6,7 @@ The process runs `gvpipe.io.scene.worker`. It gives a bounded number of frames a
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,16 @@ from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene.described import Described, FieldShape
 from gvpipe.model.sequence import MeshSequence
 
+Asked = tuple[str, ReadOptions, bool]  # a file, how it is read, and whether the frames may end before a change
 MOST_AT_ONCE = 8 << 20  # bytes of frames in an answer; a frame may have more
 
 
 class _Frames:
     """Positions ``(F, V, 3) float32``, relative to the file's origin, read by the other process when sliced."""
 
-    def __init__(self, process: LibraryProcess, held: Described) -> None:
-        self._process, self.shape, self.rounding = process, held.shape, held.rounding
+    def __init__(self, process: LibraryProcess, asked: Asked, held: Described) -> None:
+        self._process, self._asked = process, asked
+        self.shape, self.rounding, self.changes_at = held.shape, held.rounding, held.changes_at
 
     def __getitem__(self, key: slice, /) -> Float32:
         start, stop, _ = key.indices(self.shape[0])
@@ -33,27 +36,27 @@ class _Frames:
 
     def _read(self, start: int, stop: int) -> Float32:
         block: Float32
-        block, self.rounding = self._process.ask("frames", start, stop)
+        block, self.rounding = self._process.ask("frames", self._asked, start, stop)
         return block
 
     def at(self, time: float) -> Float64:
         """Positions ``(V, 3)`` at any second, with the origin; raises `InputError`."""
-        result: Float64 = self._process.ask("at", time)
+        result: Float64 = self._process.ask("at", self._asked, time)
         return result
 
 
 class _FieldFrames:
     """Values of a field, read by the other process when sliced."""
 
-    def __init__(self, process: LibraryProcess, name: str, held: FieldShape) -> None:
-        self._process, self._name, self.shape, self.dtype = process, name, held.shape, held.dtype
+    def __init__(self, process: LibraryProcess, asked: Asked, name: str, held: FieldShape) -> None:
+        self._process, self._asked, self._name, self.shape, self.dtype = process, asked, name, held.shape, held.dtype
 
     def __getitem__(self, key: slice, /) -> Array:
         start, stop, _ = key.indices(self.shape[0])
         return _in_pieces(start, stop, self.shape, self.dtype, self._read)
 
     def _read(self, start: int, stop: int) -> Array:
-        block: Array = self._process.ask("field", self._name, start, stop)
+        block: Array = self._process.ask("field", self._asked, self._name, start, stop)
         return block
 
 
@@ -65,12 +68,13 @@ def read_scene(process: LibraryProcess, where: str, options: ReadOptions) -> Mes
         where: the file.
         options: for the reader.
     """
-    held: Described = process.prepare("open", where, options)
+    asked = (where, replace(options, memory=None), options.memory is not None)  # it has a memory of its own there
+    held: Described = process.ask("open", asked)
     fields = {
-        name: Field(_FieldFrames(process, name, field), field.domain, field.kind, name=name)
+        name: Field(_FieldFrames(process, asked, name, field), field.domain, field.kind, name=name)
         for name, field in held.fields.items()
     }
-    frames = _Frames(process, held)
+    frames = _Frames(process, asked, held)
     unruled = first_normals_note(held.attributes, held.faces, frames) if held.moves_normals else ()
     return MeshSequence(
         frames,

@@ -64,7 +64,7 @@ def read_ensight(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: it is no such file, a file that it names is missing or damaged, or it has elements that are not read.
     """
     with reading(path, "EnSight"):
-        steps = EnsightSteps(path)
+        steps = options.keep("steps", lambda: EnsightSteps(path))
     return read_steps(steps, path, options, steps.notes)
 
 

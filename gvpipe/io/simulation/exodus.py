@@ -55,9 +55,9 @@ def read_exodus(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: it is no such file, is damaged, or has elements that are not read.
     """
-    file = open_netcdf(path)
+    file = options.keep("file", lambda: open_netcdf(path))
     with reading(path, "Exodus"):
-        steps = ExodusSteps(file)
+        steps = options.keep("steps", lambda: ExodusSteps(file))
     return read_steps(steps, path, options, steps.notes)
 
 

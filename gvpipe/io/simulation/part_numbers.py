@@ -92,6 +92,7 @@ def with_blocks(step: Dataset, texts: Mapping[str, Callable[[], Sequence[str]]])
     if key is None:
         return step
     numbers, names = np.asarray(step.cell_data[key].read()), texts[names_key(key)]()
+    numbers = numbers[:, 0] if numbers.ndim == 2 and numbers.shape[1] == 1 else numbers
     if not _are_runs(numbers, len(names)):
         return step
     counts = np.bincount(numbers.astype(np.int64), minlength=len(names)).tolist()

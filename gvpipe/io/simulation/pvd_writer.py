@@ -6,13 +6,18 @@ Files are .vtp, or .vtu of a sequence with a volume.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
+from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.atomic import atomic_files
 from gvpipe.foundation.errors import OutputError
 from gvpipe.io.frames.writer import write_frames
 from gvpipe.io.simulation.vtu_writer import write_grids
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 HEAD = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>\n'
@@ -27,23 +32,49 @@ def write_pvd(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     Raises:
         OutputError: a file or the folder cannot be written.
     """
-    digits = max(4, len(str(sequence.n_frames - 1)))
+    return _write([sequence], [sequence.times], path)
+
+
+def write_capture(capture: Capture, path: Path) -> tuple[str, ...]:
+    """The same for a capture: one list, whose files are numbered through."""
+    return _write(capture.shots, capture_times(capture), path)
+
+
+def capture_times(capture: Capture) -> list[Float64]:
+    """Seconds of the frames of each shot: their own where those rise, else numbers of frames, by the rate."""
+    own = [shot.times for shot in capture.shots]
+    if all(before[-1] < behind[0] for before, behind in pairwise(own)):
+        return own
+    start = capture.shots[0].metadata.start_time
+    spans = zip(capture.starts, capture.lengths, strict=True)
+    return [start + np.arange(begin, begin + length) / capture.fps for begin, length in spans]
+
+
+def _write(shots: Sequence[MeshSequence], times: Sequence[Float64], path: Path) -> tuple[str, ...]:
+    digits = max(4, len(str(sum(map(len, times)) - 1)))
     name = path.stem.replace("%", "_").replace("#", "_").replace("$", "_")  # no second pattern in the name
-    suffix = ".vtp" if sequence.volume is None else ".vtu"
-    listed = "".join(
-        f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{name}_{frame:0{digits}d}{suffix}")}/>\n'
-        for frame, time in enumerate(sequence.times)
-    )
+    listed: list[str] = []
+    notes: list[str] = []
     with atomic_files(path.parent) as folder:
-        try:
-            if sequence.volume is None:
-                notes = write_frames(sequence, str(folder / name / f"{name}_%0{digits}d.vtp"))
-            else:
-                notes = write_grids(sequence, lambda frame: folder / name / f"{name}_{frame:0{digits}d}.vtu")
-        except OutputError as exc:
-            raise OutputError(str(exc).replace(str(folder), str(path.parent)).partition("; frames ")[0]) from exc
-        (folder / path.name).write_text(f"{HEAD}{listed}{TAIL}", "utf-8")
-    return notes
+        for shot, own in zip(shots, times, strict=True):
+            start, suffix = len(listed), ".vtp" if shot.volume is None else ".vtu"
+            listed += [
+                f'<DataSet timestep="{time:.17g}" part="0" file={quoteattr(f"{name}/{name}_{frame:0{digits}d}{suffix}")}/>\n'
+                for frame, time in enumerate(own, start)
+            ]
+            try:
+                if shot.volume is None:
+                    notes += write_frames(shot, str(folder / name / f"{name}_%0{digits}d.vtp"), start)
+                else:
+                    notes += _write_grids(shot, folder / name, f"{name}_{{:0{digits}d}}.vtu", start)
+            except OutputError as exc:
+                raise OutputError(str(exc).replace(str(folder), str(path.parent)).partition("; frames ")[0]) from exc
+        (folder / path.name).write_text(f"{HEAD}{''.join(listed)}{TAIL}", "utf-8")
+    return tuple(dict.fromkeys(notes))
+
+
+def _write_grids(shot: MeshSequence, folder: Path, pattern: str, start: int) -> tuple[str, ...]:
+    return write_grids(shot, lambda frame: folder / pattern.format(start + frame))
 
 
 def join_lists(lists: Sequence[Path], path: Path) -> None:

@@ -48,15 +48,20 @@ class StepFrames:
         steps: of the file.
         first, stop: steps that are frames.
         path: the file, for messages.
+        until_change: whether the frames end before the first step of other cells.
+
+    Attributes:
+        changes_at: number of the step before which they ended; None: all are frames.
 
     Raises:
         InputError: here for the first frame, when sliced for any other: it cannot be read, has other cells than the
             first, or a coordinate that is not finite.
     """
 
-    def __init__(self, steps: Steps, first: int, stop: int, path: Path) -> None:
+    def __init__(self, steps: Steps, first: int, stop: int, path: Path, until_change: bool = False) -> None:
         self._steps, self.start, self.path = steps, first, path
         self._n_frames = stop - first
+        self.changes_at: int | None = None
         self._lock = ForkLock()  # HDF5 and netCDF files are read by one thread at a time
         self._welding = Welding()
         self.first = self.guarded(0, lambda: without_duplicates(steps.open(first), self._welding))
@@ -70,6 +75,11 @@ class StepFrames:
         self.origin: Float64 = choose_origin(exact)
         self.rounding = 0.0  # what float32 moved a coordinate by at most, model units, in the frames loaded so far
         self.values = surface_values(self.first, self.surface)
+        if until_change:
+            self._end_before_change()
+
+    def __len__(self) -> int:
+        return self._n_frames
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -85,6 +95,14 @@ class StepFrames:
             block[i] = narrow(exact, self.origin)[0]
             self.rounding = max(self.rounding, rounding(exact, block[i : i + 1], self.origin))
         return block
+
+    def _end_before_change(self) -> None:
+        for frame in range(1, self._n_frames):
+            try:
+                self.open(frame)
+            except TopologyChange:
+                self._n_frames, self.changes_at = frame, self.start + frame
+                return
 
     def points(self, frame: int) -> Floats:
         """All points of the grid, ``(N, 3)`` model units; raises `InputError`."""

@@ -49,15 +49,20 @@ def read_step_list(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: it is no such list, names a file that is missing or lies outside its folder, or a file cannot be read.
     """
     with reading(path, path.suffix[1:], remedy="save it again"):
-        listed, parts = _read_list(path)
+        listed, parts = options.keep("list", lambda: _read_list(path))
         if len(parts) > 1:
-            return read_steps(_PartSteps(path, listed, parts), path, options)
+            return read_steps(options.keep("steps", lambda: _PartSteps(path, listed, parts)), path, options)
         start, stop = options.span(len(listed), str(path))
+        whole = listed if options.memory else listed[start:stop]
+        every = options.keep("files", lambda: _files(path, whole))
+        files = every[start:stop] if options.memory else every
         listed = listed[start:stop]
-        files = [side_file(path, name, "step", later=True) for _, name, _ in listed]
         n_empty = _count_empty(files) if options.frames is None else 0
         files, listed, start = files[n_empty:], listed[n_empty:], start + n_empty
     times = np.array([time for time, _, _ in listed], np.float64)
+    if options.volume and options.memory is not None and len({file.suffix.lower() for file in every}) == 1:
+        moments = np.array([time for time, _, _ in whole], np.float64)
+        return read_steps(options.keep("volumes", lambda: FileSteps(every, moments)), path, options)
     if options.volume and len({file.suffix.lower() for file in files}) == 1:
         steps = read_steps(FileSteps(files, times), path, replace(options, frames=None))
         return replace(steps, notes=(*empty_note(n_empty), *steps.notes))
@@ -73,8 +78,8 @@ def read_volume_files(files: list[Path], name: str, options: ReadOptions, notes:
         options: as of `read_steps`.
         notes: of whoever found them.
     """
-    times = file_times(files) if len(files) > 1 else None
-    sequence = read_steps(FileSteps(files, times), Path(name), options)
+    times = options.keep("moments", lambda: file_times(files)) if len(files) > 1 else None
+    sequence = read_steps(options.keep("volumes", lambda: FileSteps(files, times)), Path(name), options)
     left = tuple(each for each in sequence.not_carried if each not in TOLD)
     return replace(sequence, notes=(*notes, *sequence.notes), not_carried=left)
 
@@ -95,9 +100,9 @@ def read_listed(
     suffixes = {file.suffix.lower() for file in files}
     if len(suffixes) > 1 or not suffixes <= set(STEPS):
         raise InputError(f"{path} lists {', '.join(sorted(suffixes))} files; files of one of {', '.join(STEPS)} are needed")
-    frames = FrameFiles(files, start)
+    frames = FrameFiles(files, start, options.memory is not None)
     first, columns = frames.first, split_columns(frames)
-    timing = time_steps(times, len(files), options.fps, options.real_time)
+    timing = time_steps(times[: len(frames.paths)], len(frames.paths), options.fps, options.real_time)
     metadata = replace(first.metadata, start_time=timing.start, source=path.name, times=timing.times)
     return MeshSequence(
         frames,
@@ -142,6 +147,10 @@ class _PartSteps:
                 raise ValueError(f"it lists {file.name!r}; files of {', '.join(STEPS)} are needed")
             found.append((part, dataset_loader(file.suffix.lower())(file)))
         return join_blocks(found)
+
+
+def _files(path: Path, listed: list[Listed]) -> list[Path]:
+    return [side_file(path, name, "step", later=True) for _, name, _ in listed]
 
 
 def _count_empty(files: list[Path]) -> int:

@@ -41,7 +41,8 @@ def read_steps(steps: Steps, path: Path, options: ReadOptions, notes: tuple[str,
     if options.frames is None:
         first, empty = _without_empty(steps, first, stop, path)
         notes = (*notes, *empty)
-    frames = StepFrames(steps, first, stop, path)
+    frames = StepFrames(steps, first, stop, path, options.memory is not None)
+    stop = first + len(frames)
     attributes, fields, left = _split(frames, str(path))
     volume = read_volume(frames, [*attributes, *fields]) if options.volume else None
     left_inside = frames.surface.not_carried if volume is None else frames.surface.without_inside

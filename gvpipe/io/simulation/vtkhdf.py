@@ -7,7 +7,7 @@ Numbers of all steps stand one after the other; `Steps` says where each step sta
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -48,10 +48,14 @@ def read_vtkhdf(path: Path, options: ReadOptions) -> MeshSequence:
     Raises:
         InputError: h5py is missing, it is no such file, it is damaged, or its data set is of another kind.
     """
-    file = open_hdf(path)
+    file = options.keep("file", lambda: open_hdf(path))
     with reading(path, "VTKHDF"):
-        steps = BlockSteps(file) if file.attribute(ROOT, "Type") in COLLECTIONS else VtkHdfSteps(file)
+        steps = options.keep("steps", lambda: _steps_of(file))
     return read_steps(steps, path, options)
+
+
+def _steps_of(file: HdfFile) -> VtkHdfSteps | BlockSteps:
+    return BlockSteps(file) if file.attribute(ROOT, "Type") in COLLECTIONS else VtkHdfSteps(file)
 
 
 class BlockSteps:
@@ -143,7 +147,7 @@ class VtkHdfSteps:
         self._known: tuple[tuple[int, ...], Cells] | None = None
         self._whole = file.names(f"{root}/FieldData")
         named = [name for name in self._whole if not file.has_numbers(f"{root}/FieldData/{name}")]
-        self._names = {name: partial(file.texts, f"{root}/FieldData/{name}") for name in named}
+        self._names = {name: cache(partial(file.texts, f"{root}/FieldData/{name}")) for name in named}
         groups = [f"{root}/{group}" for group in ("PointData", "CellData")]
         self._texts = [
             text_array(name) for group in groups for name in file.names(group) if not file.has_numbers(f"{group}/{name}")
@@ -163,7 +167,14 @@ class VtkHdfSteps:
             self._data("CellData", step, self._first_cell(step, first), len(cells.types)),
             not_carried=(*map(field_data, self._whole), *self._texts),
         )
-        return with_blocks(made, self._names)
+        return with_blocks(made, {name: partial(self._texts_of, name, step) for name in self._names})
+
+    def _texts_of(self, name: str, step: int) -> list[str]:
+        """The texts of a step among those of all."""
+        texts = self._names[name]()
+        start = self._offset(f"FieldDataOffsets/{name}", step, 0)
+        count = self._offset(f"FieldDataSizes/{name}", step, len(texts), 1)
+        return texts[max(start, 0) : max(start, 0) + max(count, 0)]
 
     def _sizes(self, name: str) -> Int64:
         held = self._tables.get(name)
@@ -244,10 +255,14 @@ class VtkHdfSteps:
             raise ValueError(f"it has sizes of {len(cells_of_part)} parts, {stop} are needed")
         cell = self._offset("CellOffsets", step, int(cells_of_part[:first].sum()), column)
         node = self._offset("ConnectivityIdOffsets", step, int(nodes_of_part[:first].sum()), column)
+        before = first  # parts whose offsets come first
+        if len(self._file.dataset(f"{self._root}/{group}Offsets")) < cells_of_part.sum() + len(cells_of_part):
+            ends = np.concatenate([[0], np.cumsum(cells_of_part)])  # steps share their cells, which are there once
+            before = int(np.searchsorted(ends, cell))
         pieces = []
         for number in range(first, stop):
             n_cells, n_nodes = int(cells_of_part[number]), int(nodes_of_part[number])
-            start = cell + number  # each part has one offset more than cells
+            start = cell + before + number - first  # each part has one offset more than cells
             offsets = self._file.read(f"{self._root}/{group}Offsets", start, start + n_cells + 1).astype(np.int64).reshape(-1)
             nodes = self._file.read(f"{self._root}/{group}Connectivity", node, node + n_nodes).astype(np.int64).reshape(-1)
             types = (

@@ -54,9 +54,9 @@ def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]
     content = poly_content(sequence, "VTKHDF", has_units=True, parts="blocks" if named else "numbers")
     blocks = find_blocks(sequence, content)
     with h5py.File(path, "w") as file:
-        root = _start_set(file, ROOT, "MultiBlockDataSet" if named else "PolyData")
+        root = start_set(file, ROOT, "MultiBlockDataSet" if named else "PolyData")
         for number, block in enumerate(blocks):
-            group = _start_set(root, block.path, "PolyData") if named else root
+            group = start_set(root, block.path, "PolyData") if named else root
             group["NumberOfPoints"] = np.array([block.vertices.stop - block.vertices.start], np.int64)
             _write_polygons(group, content, block)
             _write_steps(group, sequence, content, block)
@@ -69,7 +69,7 @@ def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]
             for block, own in zip(blocks, named, strict=True):
                 assembly[own] = h5py.SoftLink(f"/{block.path}")
         _write_frames(file, sequence, content, blocks)
-    changed = {name: _safe(name) for name in (*content.attributes, *content.fields)}
+    changed = {name: safe_name(name) for name in (*content.attributes, *content.fields)}
     names = [(part.name, own) for part, own in zip(sequence.parts, named, strict=False)]
     return (*content.notes, *renamed_note([*names, *changed.items()], "VTKHDF"))
 
@@ -81,7 +81,7 @@ def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str,
     cells, is_far = content.cells, bool(sequence.origin.any())
     rows = {"vertex": sequence.n_vertices, "triangle": len(cells.types)}
     with h5py.File(path, "w") as file:
-        root = _start_set(file, ROOT, "UnstructuredGrid")
+        root = start_set(file, ROOT, "UnstructuredGrid")
         for key, count in zip(SIZES, (sequence.n_vertices, len(cells.types), len(cells.nodes)), strict=True):
             root[key] = np.array([count], np.int64)
         for key, values in (("Types", cells.types), ("Offsets", cells.offsets), ("Connectivity", cells.nodes)):
@@ -94,13 +94,13 @@ def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str,
         targets = []
         for group_name, domain in GROUPS:
             group, offsets = root.create_group(group_name), steps.create_group(f"{group_name}Offsets")
-            _write_roles(group, content.surface, domain)
+            write_roles(group, content.surface, domain)
             for key, one in content.names(domain).items():
                 is_moving, width = content.is_moving(domain, key), content.width(domain, key)
                 shape = (rows[domain] * (n_frames if is_moving else 1), width)
-                target = _dataset(group, _safe(key), shape if width > 1 else shape[:1], content.dtype(domain, key))
-                _write_unit(target, one.unit)
-                offsets[_safe(key)] = np.arange(n_frames) * (rows[domain] if is_moving else 0)
+                target = _dataset(group, safe_name(key), shape if width > 1 else shape[:1], content.dtype(domain, key))
+                write_unit(target, one.unit)
+                offsets[safe_name(key)] = np.arange(n_frames) * (rows[domain] if is_moving else 0)
                 if is_moving:
                     targets.append((domain, key, target))
                 else:
@@ -111,11 +111,12 @@ def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str,
             for domain, key, target in targets:
                 values = content.read(domain, key, start, stop)
                 target[start * rows[domain] : stop * rows[domain]] = values.reshape(-1, *target.shape[1:])
-    names = [(key, _safe(key)) for _, domain in GROUPS for key in content.names(domain)]
+    names = [(key, safe_name(key)) for _, domain in GROUPS for key in content.names(domain)]
     return (*content.notes, *renamed_note(names, "VTKHDF"))
 
 
-def _start_set(above: Any, path: str, kind: str) -> Any:
+def start_set(above: Any, path: str, kind: str) -> Any:
+    """A new group of a data set, of a kind of VTK's."""
     group = above.create_group(f"/{path}", track_order=True)  # VTK lists blocks in the order in which they were made
     group.attrs["Version"] = np.array(VERSION, np.int64)
     group.attrs["Type"] = np.bytes_(kind)
@@ -144,9 +145,9 @@ def _write_steps(root: Any, sequence: MeshSequence, content: PolyContent, block:
         offsets = steps.create_group(f"{group}Offsets")
         rows = block.rows(domain)
         for name in content.still(domain):
-            offsets[_safe(name)] = np.zeros(n_frames, np.int64)
+            offsets[safe_name(name)] = np.zeros(n_frames, np.int64)
         for name in content.moving(domain):
-            offsets[_safe(name)] = frames * (rows.stop - rows.start)
+            offsets[safe_name(name)] = frames * (rows.stop - rows.start)
 
 
 def _start_steps(root: Any, sequence: MeshSequence, n_vertices: int) -> Any:
@@ -161,10 +162,11 @@ def _start_steps(root: Any, sequence: MeshSequence, n_vertices: int) -> Any:
     return steps
 
 
-def _write_roles(group: Any, content: PolyContent, domain: str) -> None:
+def write_roles(group: Any, content: PolyContent, domain: str) -> None:
+    """Say which of a group's arrays are normals and texture coordinates."""
     for kind, role in ROLES.items():
         if content.role(domain, kind):
-            group.attrs[role] = np.bytes_(_safe(content.role(domain, kind)))
+            group.attrs[role] = np.bytes_(safe_name(content.role(domain, kind)))
 
 
 def _write_texts(h5py: Any, root: Any, content: PolyContent, n_frames: int) -> None:
@@ -180,12 +182,12 @@ def _write_still(root: Any, content: PolyContent, block: Block) -> None:
     """Groups of numbers, and those that stand still."""
     for group_name, domain in GROUPS:
         group = root.create_group(group_name)
-        _write_roles(group, content, domain)
+        write_roles(group, content, domain)
         for name, values in content.still(domain).items():
-            own = _plain(values[block.rows(domain)])
-            held = _dataset(group, _safe(name), own.shape, own.dtype)
+            own = plain_columns(values[block.rows(domain)])
+            held = _dataset(group, safe_name(name), own.shape, own.dtype)
             held[...] = own
-            _write_unit(held, content.attributes[name].unit)
+            write_unit(held, content.attributes[name].unit)
 
 
 def _write_frames(file: Any, sequence: MeshSequence, content: PolyContent, blocks: list[Block]) -> None:
@@ -199,7 +201,7 @@ def _write_frames(file: Any, sequence: MeshSequence, content: PolyContent, block
         for name, one in content.fields.items():
             rows = content.rows(one, one.read(start, stop))
             for block in blocks:
-                place = f"{block.path}/{group_of[one.domain]}/{_safe(name)}"
+                place = f"{block.path}/{group_of[one.domain]}/{safe_name(name)}"
                 _put(file, place, start, rows[:, block.rows(one.domain)], sequence.n_frames, one.unit)
 
 
@@ -211,7 +213,7 @@ def _put(file: Any, place: str, start: int, values: Array, n_frames: int, unit: 
     n_rows, width = values.shape[1:]
     shape = (n_frames * n_rows, width) if width > 1 else (n_frames * n_rows,)
     if start == 0:
-        _write_unit(_dataset(file, place, shape, values.dtype, len(values) * n_rows), unit)
+        write_unit(_dataset(file, place, shape, values.dtype, len(values) * n_rows), unit)
     file[place][start * n_rows : (start + len(values)) * n_rows] = values.reshape(-1, *shape[1:])
 
 
@@ -221,17 +223,17 @@ def _dataset(group: Any, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]
     return group.create_dataset(name, shape, dtype, chunks=chunk, compression="gzip", compression_opts=4, shuffle=True)
 
 
-def _write_unit(held: Any, unit: str) -> None:
+def write_unit(held: Any, unit: str) -> None:
     """The unit as an attribute, which VTK passes over: its format has no place for one."""
     if unit:
         held.attrs[UNIT] = unit
 
 
-def _plain(values: Array) -> Array:
+def plain_columns(values: Array) -> Array:
     """One component as one column less."""
     return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
 
 
-def _safe(name: str) -> str:
+def safe_name(name: str) -> str:
     """A name without what HDF5 takes for a path."""
     return name.replace("/", "_") or "unnamed"

@@ -7,6 +7,7 @@ cells. Source: XDMF, "XDMF model and format"; for functions, vtkXdmfReader of VT
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
 from gvpipe.io.simulation.dataset import DataArray, Dataset
+from gvpipe.io.simulation.part_numbers import with_blocks
 from gvpipe.io.simulation.steps import read_steps
 from gvpipe.io.simulation.xdmf_items import Items
 from gvpipe.io.simulation.xdmf_references import References
@@ -53,7 +55,7 @@ def read_xdmf(path: Path, options: ReadOptions) -> MeshSequence:
         InputError: h5py is missing for HDF5, it is no such file, it is damaged, or a file that it names is missing.
     """
     with reading(path, "XDMF"):
-        steps = XdmfSteps(path)
+        steps = options.keep("steps", lambda: XdmfSteps(path))
     return read_steps(steps, path, options)
 
 
@@ -70,6 +72,15 @@ def _others(grids: list[ElementTree.Element]) -> list[str]:
     """What grids have beside a mesh and its numbers."""
     found = [each for grid in grids for each in grid if each.tag == "Set"]
     return [f"{each.tag} {each.get('Name') or 'unnamed'!r}" for each in found]
+
+
+def _texts_of(value: str) -> list[str]:
+    """The texts of an ``Information`` that gvpipe writes; none of another."""
+    try:
+        found = json.loads(value)
+    except (ValueError, RecursionError):
+        return []
+    return found if isinstance(found, list) and all(isinstance(each, str) for each in found) else []
 
 
 class XdmfSteps:
@@ -105,6 +116,8 @@ class XdmfSteps:
             for grid in root.findall("Domain/Grid")
             if not temporal and grid not in taken
         ]
+        named = {each.get("Name") or "": each.get("Value") or "" for each in root.findall("Domain/Information")}
+        self._texts = {name: partial(_texts_of, value) for name, value in named.items()}
         self._known: dict[str, Cells] = {}
         self._n_visited = 0  # grids of the step that is being opened
 
@@ -121,7 +134,7 @@ class XdmfSteps:
                 else:
                     own.append(grid)
         if len(blocks) == 1 and _is_uniform(self._references.target(self._steps[step][0])):
-            return self._open(blocks[0][1])
+            return with_blocks(self._open(blocks[0][1]), self._texts)
         return join_blocks([(name, self._open(grids)) for name, grids in blocks])
 
     def _home_of(

@@ -1,10 +1,13 @@
 """A sequence as XDMF: XML that lists time steps, and HDF5 beside it that holds their numbers.
 
+Parts are numbers of cells (`gvpipe.io.simulation.part_numbers`). An ``Information`` has their names, as JSON.
+
 Source: XDMF model and format, www.xdmf.org (topology types, temporal collections).
 """
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
@@ -42,7 +45,7 @@ def write_xdmf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     with atomic_files(path.parent) as folder:
         heavy = folder / f"{path.stem}.h5"
         notes = write_by(__name__, "write_here", sequence, heavy)
-        content = grid_content(sequence, "XDMF")
+        content = grid_content(sequence, "XDMF", parts="numbers")
         (folder / path.name).write_text(_light(sequence, content, heavy.name), "utf-8")
     return (*notes, *inside_notes("XDMF", lost))
 
@@ -50,7 +53,7 @@ def write_xdmf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
 def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]:
     """Write the HDF5 file in this process; a file that cannot be written is left as it is."""
     h5py = import_h5py(str(path))
-    content, is_far = grid_content(sequence, "XDMF"), bool(sequence.origin.any())
+    content, is_far = grid_content(sequence, "XDMF", parts="numbers"), bool(sequence.origin.any())
     with h5py.File(path, "w") as file:
         _put(file, "topology", _topology(content.cells))
         for domain in CENTRES:
@@ -117,8 +120,10 @@ def _light(sequence: MeshSequence, content: GridContent, heavy: str) -> str:
             f'<Grid Name="mesh" GridType="Uniform"><Time Value="{time:.17g}"/>{mesh}'
             f'<Geometry GeometryType="XYZ">{place}</Geometry>{attributes}</Grid>'
         )
+    named = content.surface.texts.items()
+    texts = "".join(f"<Information Name={quoteattr(key)} Value={quoteattr(json.dumps(names))}/>" for key, names in named)
     return (
-        '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain><Grid Name="steps" GridType="Collection" '
+        f'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>{texts}<Grid Name="steps" GridType="Collection" '
         'CollectionType="Temporal">\n' + "\n".join(grids) + "\n</Grid></Domain></Xdmf>\n"
     )
 

@@ -24,9 +24,14 @@ class Materials:
     """The materials that meshes and subsets of a stage bind, each once.
 
     A material that both single-sided and double-sided meshes bind becomes two.
+
+    Args:
+        path: of the stage.
+        time: at which pictures, colours and numbers that change are taken; None: their value for all times, or the earliest.
     """
 
-    def __init__(self, stage: Any, path: Path) -> None:
+    def __init__(self, path: Path, time: float | None = None) -> None:
+        self._time = time
         self.textures = Textures(path)
         self.materials: list[Material] = []
         self.plain: list[str] = []  # materials without UsdPreviewSurface
@@ -137,7 +142,7 @@ class Materials:
             return source.scale[:3], source
         if _shows_colors(surface, name):
             return (1.0, 1.0, 1.0), None  # the mesh's own colours
-        value = _value(surface, name)
+        value = _value(surface, name, self._time)
         made = tuple(float(x) for x in value)[:3] if value is not None else fallback
         return (made if len(made) == 3 and all(math.isfinite(x) for x in made) else fallback), None
 
@@ -145,7 +150,7 @@ class Materials:
         source = self._source(surface, name)
         if source is not None:
             return source.scale[CHANNELS.get(source.output, 0)], source
-        value = _value(surface, name)
+        value = _value(surface, name, self._time)
         made = float(value) if isinstance(value, int | float) else fallback
         return (made if math.isfinite(made) else fallback), None
 
@@ -165,7 +170,7 @@ class Materials:
         wrap = tuple(WRAPS.get(str(_value(shader, axis)), "repeat") for axis in ("wrapS", "wrapT"))
         scale = _value(shader, "scale")
         factors = tuple(float(x) for x in scale) if scale is not None else (1.0, 1.0, 1.0, 1.0)
-        return self.textures.read(_value(shader, "file"), output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
+        return self.textures.read(_value(shader, "file", self._time), output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
 
 
 def _shows_colors(surface: Any, name: str) -> bool:
@@ -220,8 +225,8 @@ def _connected(shader: Any, name: str) -> tuple[Any, str]:
     return None, ""
 
 
-def _value(shader: Any, name: str) -> Any:
-    """The value of an input, through the interface of its material, or None."""
+def _value(shader: Any, name: str, time: float | None = None) -> Any:
+    """The value of an input, through the interface of its material, or None; at a time, if that is given."""
     from pxr import Usd, UsdShade
 
     given = shader.GetInput(name)
@@ -229,6 +234,6 @@ def _value(shader: Any, name: str) -> Any:
         return None
     for attribute in UsdShade.Utils.GetValueProducingAttributes(given):
         if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Input:
-            value = attribute.Get()
+            value = attribute.Get() if time is None else attribute.Get(time)
             return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
     return None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +16,7 @@ from gvpipe.io.scene.frames import first_frame_of
 from gvpipe.io.usd.instances import Instance, find_instances, is_hidden_below
 from gvpipe.io.usd.materials import Materials
 from gvpipe.io.usd.motion import visibility_samples
-from gvpipe.io.usd.primvars import is_passed_over
+from gvpipe.io.usd.primvars import is_passed_over, varies_in
 
 HIDDEN_PURPOSES = ("guide", "proxy")
 TAKEN = {  # types of prims that are read, or that only hold others
@@ -55,7 +57,6 @@ def find_meshes(stage: Any) -> Found:
         sets = prim.GetVariantSets()
         several = [name for name in sets.GetNames() if len(sets.GetVariantSet(name).GetVariantNames()) > 1]
         left.add_all(f"other variants of set {name}" for name in several)
-        left.add_all(_animated_inputs(prim))
         custom = [str(each.GetName()) for each in prim.GetAuthoredAttributes() if each.IsCustom()]
         left.add_all(f"attribute {name}" for name in custom if name not in NAMES)
         if prim.IsA(UsdGeom.PointInstancer):
@@ -92,14 +93,14 @@ def find_meshes(stage: Any) -> Found:
     return Found(tuple(meshes), tuple(notes), left)
 
 
-def _animated_inputs(prim: Any) -> list[str]:
-    """What of a shader changes over time: materials stand still here."""
-    from pxr import UsdShade
+def animated_inputs(stage: Any, span: tuple[float, float] | None) -> Iterator[str]:
+    """What of shaders changes over time, or from a time to another: materials stand still here."""
+    from pxr import Usd, UsdShade
 
-    if not (prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph)):  # materials are node graphs
-        return []
-    inputs = UsdShade.ConnectableAPI(prim).GetInputs()
-    return [f"animation of {each.GetBaseName()}" for each in inputs if each.GetAttr().ValueMightBeTimeVarying()]
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        if prim.IsA(UsdShade.Shader) or prim.IsA(UsdShade.NodeGraph):  # materials are node graphs
+            inputs = UsdShade.ConnectableAPI(prim).GetInputs()
+            yield from (f"animation of {each.GetBaseName()}" for each in inputs if varies_in(each.GetAttr(), span))
 
 
 def _left_of(mesh: Any) -> list[str]:
@@ -145,8 +146,7 @@ def polygons_of(mesh: Any, times: Array, where: str, start: int = 0) -> tuple[In
     result = []
     for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()):
         first = _integers(attribute, float(times[0]))
-        samples = attribute.GetTimeSamples() if attribute.ValueMightBeTimeVarying() else []
-        for moment in (each for each in samples if times[0] < each <= times[-1] + 1e-6):
+        for moment in _moments(attribute, times):
             if not np.array_equal(_integers(attribute, moment), first):
                 number = start + first_frame_of(moment, times)
                 what = f"the topology of mesh {_path(mesh)} changes at frame {number} (time code {moment:g})"
@@ -155,7 +155,26 @@ def polygons_of(mesh: Any, times: Array, where: str, start: int = 0) -> tuple[In
     return result[0], result[1]
 
 
-def groups_of(mesh: Any, n_polygons: int, materials: Materials) -> tuple[Int64, tuple[int | None, ...]]:
+def changing_frames(mesh: Any, times: Array) -> Iterator[int]:
+    """The first frame, at ``times``, where corners per polygon differ, and the first where the vertices of corners do."""
+    for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()):
+        moments = _moments(attribute, times)
+        first = _integers(attribute, float(times[0]))
+        for moment in moments:
+            if not np.array_equal(_integers(attribute, moment), first):
+                yield first_frame_of(moment, times)
+                break
+
+
+def _moments(attribute: Any, times: Array) -> list[float]:
+    """Times of samples behind the first frame."""
+    if not attribute.ValueMightBeTimeVarying():
+        return []
+    samples = attribute.GetTimeSamples()
+    return samples[bisect_right(samples, times[0]) : bisect_right(samples, times[-1] + 1e-6)]  # type: ignore[no-any-return]
+
+
+def groups_of(mesh: Any, n_polygons: int, materials: Materials, time: float) -> tuple[Int64, tuple[int | None, ...]]:
     """Return the group ``(P,)`` of each polygon and the material of each group: one per subset that binds materials.
 
     Polygons of no subset are group 0; those of several are of the first.
@@ -167,7 +186,7 @@ def groups_of(mesh: Any, n_polygons: int, materials: Materials) -> tuple[Int64, 
     for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
         if subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
             continue
-        indices = _integers(subset.GetIndicesAttr(), 0.0)
+        indices = _integers(subset.GetIndicesAttr(), time)
         indices = indices[(indices >= 0) & (indices < n_polygons)]
         groups[indices[groups[indices] == 0]] = len(bound)
         bound.append(materials.of(subset.GetPrim()))

@@ -99,6 +99,11 @@ class UsdMotion:
         self._rest: Float64 | None = None  # points that never change in the mesh's own space
         self.n_vertices = len(self._points.Get(start) or ())
 
+    @property
+    def has_points(self) -> bool:
+        """Whether it has points at any time."""
+        return any(len(self._points.Get(time) or ()) for time in self._points.GetTimeSamples())
+
     def samples(self) -> Iterable[float]:
         """Times of all samples that move it or change its polygons."""
         yield from self._points.GetTimeSamples()

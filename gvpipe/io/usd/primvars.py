@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterable
 from typing import Any
 
@@ -20,7 +21,7 @@ OWN = ("displayColor", "displayOpacity", "normals")  # they have a meaning of th
 
 
 def layers_of(
-    mesh: Any, polygons: SceneMesh, time: float, turn: Float64
+    mesh: Any, polygons: SceneMesh, time: float, turn: Float64, last: float | None = None
 ) -> tuple[tuple[Layer, ...], dict[str, str], list[str]]:
     """Return a mesh's layers, the attribute of each uv primvar by its name, and what was left out.
 
@@ -28,19 +29,24 @@ def layers_of(
         mesh: the UsdGeom.Mesh.
         polygons: the same mesh, without layers.
         time: of the first frame; primvars that change have their values then.
+        last: time of the last frame: primvars that are the same in all frames stand still; None: no sample is compared.
         turn: ``(3, 3)`` or ``(n, 3, 3)`` how its directions turn into world space.
     """
     from pxr import UsdGeom
 
     api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
-    primvars = {each.GetPrimvarName(): each for each in api.FindPrimvarsWithInheritance() if each.HasValue()}
+    primvars = {
+        each.GetPrimvarName(): each
+        for each in api.FindPrimvarsWithInheritance()
+        if each.HasValue() and not _is_blocked(each, time)
+    }
     layers: list[Layer] = []
     left: list[str] = []
     normals = _normals(mesh, primvars.get("normals"), polygons, time, turn)
     layers.extend([normals] if normals else [])
     uv_names = sorted((name for name, each in primvars.items() if _is_uv(name, each)), key=_uv_rank)
     named_uv = {name: "uv" if not number else f"uv{number}" for number, name in enumerate(uv_names)}
-    sampled = sampled_of(mesh, polygons, time)
+    sampled = sampled_of(mesh, polygons, time, last)
     n_colors = 0
     for name, primvar in sorted(primvars.items(), key=lambda item: item[0] != "displayColor"):
         kind = "uv" if name in named_uv else _kind(primvar)
@@ -88,7 +94,7 @@ def _is_opaque(opacity: Any) -> bool:
     return bool((np.array(opacity.Get() or 1.0) == 1).all())
 
 
-def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled]:
+def sampled_of(mesh: Any, polygons: SceneMesh, time: float, last: float | None = None) -> dict[str, Sampled]:
     """The primvars of a mesh that change and can be fields: per vertex or polygon, neither uv nor normals, not indexed."""
     from pxr import UsdGeom
 
@@ -103,14 +109,14 @@ def sampled_of(mesh: Any, polygons: SceneMesh, time: float) -> dict[str, Sampled
             or _is_uv(name, primvar)
         ):
             continue
-        if primvar.ValueMightBeTimeVarying() and not primvar.IsIndexed() and primvar.GetElementSize() == 1:
+        if _varies(primvar, time, last) and not primvar.IsIndexed() and primvar.GetElementSize() == 1:
             layer = _layer(name, kind, primvar, polygons, time)
             if layer is not None:
                 found["color" if name == "displayColor" else name] = Sampled(Values(primvar), kind, domain)
     return found
 
 
-def animated_primvars(meshes: Iterable[Any]) -> set[str]:
+def animated_primvars(meshes: Iterable[Any], time: float, last: float | None = None) -> set[str]:
     """Names of primvars of some meshes that change over time, as fields would have them; normals follow their mesh."""
     from pxr import UsdGeom
 
@@ -118,9 +124,32 @@ def animated_primvars(meshes: Iterable[Any]) -> set[str]:
         str(primvar.GetPrimvarName())
         for mesh in meshes
         for primvar in UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvarsWithValues()
-        if primvar.ValueMightBeTimeVarying()
+        if _varies(primvar, time, last)
     }
     return {"color" if name == "displayColor" else name for name in found - {"normals"} if not name.startswith("skel:")}
+
+
+def _varies(primvar: Any, time: float, last: float | None) -> bool:
+    """Whether a primvar changes; given a last time, whether it does until then."""
+    if not primvar.ValueMightBeTimeVarying() or last is None:
+        return bool(primvar.ValueMightBeTimeVarying())
+    parts = [primvar.GetAttr(), *([primvar.GetIndicesAttr()] if primvar.IsIndexed() else [])]
+    return any(varies_in(part, (time, last)) for part in parts)
+
+
+def varies_in(attribute: Any, span: tuple[float, float] | None) -> bool:
+    """Whether an attribute may change over time; given a first and a last time, whether it does from the one to the other."""
+    if not attribute.ValueMightBeTimeVarying() or span is None:
+        return bool(attribute.ValueMightBeTimeVarying())
+    samples = attribute.GetTimeSamples()
+    moments = samples[bisect_right(samples, span[0]) : bisect_right(samples, span[1] + 1e-6)]
+    first = attribute.Get(span[0]) if moments else None
+    return any(attribute.Get(moment) != first for moment in moments)
+
+
+def _is_blocked(primvar: Any, time: float) -> bool:
+    """Whether a primvar that changes has no value at a time."""
+    return bool(primvar.ValueMightBeTimeVarying() and primvar.Get(time) is None)
 
 
 class Values:
@@ -168,7 +197,7 @@ def _layer(name: str, kind: str, primvar: Any, polygons: SceneMesh, time: float)
     if primvar.GetElementSize() > 1 and values.ndim == 1:
         values = values.reshape(-1, primvar.GetElementSize()) if len(values) % primvar.GetElementSize() == 0 else values
     values = values.reshape(1, -1) if not primvar.GetTypeName().isArray else values.reshape(len(values), -1)
-    indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
+    indices = primvar.GetIndicesAttr().Get(time) if primvar.IsIndexed() else None  # None where they are blocked
     own = None if indices is None else np.array(indices, np.int64)
     if own is not None and (own.min(initial=0) < 0 or own.max(initial=0) >= len(values)):
         return None

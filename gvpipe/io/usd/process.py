@@ -23,7 +23,7 @@ def read_usd(path: Path, options: ReadOptions) -> MeshSequence:
     if importlib.util.find_spec("pxr") is None:
         raise InputError(f"{path}: {EXTRA}")
     check_signature(path)
-    process = LibraryProcess(path, WORKER, "USD", DIED)
+    process = options.keep("process", lambda: LibraryProcess(path, WORKER, "USD", DIED))
     process.start()
     from gvpipe.io.scene.process import read_scene  # NumPy loads here while it loads there
 

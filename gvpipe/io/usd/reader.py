@@ -19,7 +19,7 @@ from gvpipe.io.scene.layers import join_layers
 from gvpipe.io.scene.mesh import SceneMesh, join
 from gvpipe.io.usd.instances import InstanceMotion
 from gvpipe.io.usd.materials import Materials
-from gvpipe.io.usd.meshes import find_meshes, groups_of, polygons_of
+from gvpipe.io.usd.meshes import animated_inputs, changing_frames, find_meshes, groups_of, polygons_of
 from gvpipe.io.usd.motion import Skins, UsdMotion
 from gvpipe.io.usd.names import name_of, parent_path
 from gvpipe.io.usd.primvars import animated_primvars, layers_of, sampled_of
@@ -39,7 +39,7 @@ def read_stage(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
         InputError: the file is damaged or refers to a file that is missing or outside of its folder,
             it has no mesh, a mesh's topology changes in the frames that are read, a position is not finite.
     """
-    stage = open_stage(path)
+    stage = options.keep("stage", lambda: open_stage(path))
     with usd_errors(path):
         return _read_stage(stage, path, options)
 
@@ -50,7 +50,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     where = str(path)
     check_inside(stage, path)
     found = find_meshes(stage)
-    skins, materials = Skins(stage), Materials(stage, path)
+    skins = Skins(stage)
     places = UsdGeom.XformCache()
     start = float(stage.GetStartTimeCode())
 
@@ -61,26 +61,35 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
         return InstanceMotion(mesh, skins, places, time, instance)
 
     motions = [moved(number, start) for number in range(len(found.meshes))]
-    kept = [number for number, motion in enumerate(motions) if motion.n_vertices]
-    if not kept:
+    there = [number for number, motion in enumerate(motions) if motion.n_vertices or motion.has_points]
+    if not there:
         raise InputError(f"{where} has no polygon mesh; a mesh with triangles is needed")
-    motions = [motions[number] for number in kept]
-    samples = (sample for motion in motions for sample in motion.samples())
+    samples = (sample for number in there for sample in motions[number].samples())
     times, fps, time_notes = stage_times(stage, samples, options, where)
     first, stop = options.span(len(times), where)
     times = times[first:stop]
     if float(times[0]) != start:  # meshes may have other vertices then
-        motions = [moved(number, float(times[0])) for number in kept]
+        motions = [moved(number, float(times[0])) for number in range(len(found.meshes))]
+    kept = [number for number in there if motions[number].n_vertices]
+    if not kept:
+        raise InputError(f"{where}: no mesh has points at frame {first} (time code {times[0]:g}); leave it out (--frames)")
+    changes_at = _first_change([found.meshes[number][0] for number in there], times) if options.memory else None
+    times = times[:changes_at]
+    motions = [motions[number] for number in kept]
     frames = SceneFrames(motions, times, where, "time code", first, [layer.realPath for layer in stage.GetUsedLayers()])
-    read = [_read_mesh(found.meshes[number][0], motion, materials, (times, where, first)) for number, motion in
-            zip(kept, motions, strict=True)]  # fmt: skip
+    frames.changes_at = None if changes_at is None else first + changes_at
+    last = float(times[-1]) if options.memory else None
+    materials = Materials(path, None if last is None else float(times[0]))
+    found.left.add_all(animated_inputs(stage, None if last is None else (float(times[0]), last)))
+    own = [found.meshes[number][0] for number in kept]
+    read = [_read_mesh(mesh, motion, materials, (times, where, first), last) for mesh, motion in zip(own, motions, strict=True)]
     meshes = [mesh for mesh, _ in read]
     joined = join(meshes, where)
     attributes, layer_notes = join_layers(meshes, joined.fans, frames.first)
-    sampled = [sampled_of(found.meshes[number][0], mesh, float(times[0])) for number, mesh in zip(kept, meshes, strict=True)]
+    sampled = [sampled_of(drawn, mesh, float(times[0]), last) for drawn, mesh in zip(own, meshes, strict=True)]
     fields, torn = join_fields(sampled, [mesh.n_vertices for mesh in meshes], joined.fans, times, where)
     taken = {name for mesh in (sampled if len(times) > 1 else []) for name in mesh}
-    still = animated_primvars([found.meshes[number][0] for number in kept]) - taken
+    still = animated_primvars(own, float(times[0]), last) - taken
     found.left.add_all(f"animation of primvar {name}" for name in still)
     found.left.add_all(misfits("primvar", [*(names for _, names in read), torn]))
     drawn, images = materials.drawn()
@@ -110,20 +119,26 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     return sequence, any(_has_moving_normals(motion.prim) for motion in motions)
 
 
+def _first_change(meshes: list[Any], times: Float64) -> int | None:
+    """The first of some frames whose polygons are not those of the first; None: there is none."""
+    return min((at for mesh in meshes for at in changing_frames(mesh, times)), default=None)
+
+
 def _read_mesh(
-    mesh: Any, motion: UsdMotion, materials: Materials, frames: tuple[Float64, str, int]
+    mesh: Any, motion: UsdMotion, materials: Materials, frames: tuple[Float64, str, int], last: float | None
 ) -> tuple[SceneMesh, list[str]]:
     """One mesh with its layers, and the names of primvars that were left out.
 
     Args:
         mesh, motion, materials: what is read.
         frames: their time codes, the file, and the number of the first.
+        last: as of `layers_of`.
     """
     from pxr import UsdGeom
 
     prim, time = mesh.GetPrim(), float(frames[0][0])
     counts, corners = polygons_of(mesh, *frames)
-    groups, bound = groups_of(mesh, len(counts), materials)
+    groups, bound = groups_of(mesh, len(counts), materials, time)
     turn = motion.linear(time)
     whole = turn if turn.ndim == 2 else turn.mean(axis=0)
     is_left = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
@@ -131,7 +146,7 @@ def _read_mesh(
     plain = SceneMesh(
         name_of(prim), parent_path(prim), motion.n_vertices, counts, corners, groups, bound, is_left != is_mirrored
     )
-    layers, uv_names, left = layers_of(mesh, plain, time, turn)
+    layers, uv_names, left = layers_of(mesh, plain, time, turn, last)
     materials.name_uv(bound, uv_names)
     return replace(plain, layers=layers), left
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gvpipe.foundation.isolation.confinement import confine
+from gvpipe.foundation.isolation.confinement import confine_once
 from gvpipe.io.library.worker import bytes_below, limit_memory, limited_time
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.scene.worker import serve_scene
@@ -21,14 +21,19 @@ def read_limited(path: Path, options: ReadOptions) -> tuple[MeshSequence, bool]:
     os.environ.setdefault("PXR_WORK_THREAD_LIMIT", str(THREADS))
     import pxr.UsdSkel  # noqa: F401  libraries of code do not count
 
-    confine([os.path.dirname(os.path.realpath(path))])
+    confine_once(os.path.dirname(os.path.realpath(path)))
 
     if options.unlimited:
         return read_stage(path, options)
+    with limited_time(options.keep("bytes", lambda: _limit(path))):
+        return read_stage(path, options)
+
+
+def _limit(path: Path) -> int:
+    """Limit the memory, and return the bytes that it follows from."""
     n_bytes = max(path.stat().st_size, bytes_below(path.absolute().parent, tuple(SIGNATURES)))
     limit_memory(n_bytes)
-    with limited_time(n_bytes):
-        return read_stage(path, options)
+    return n_bytes
 
 
 if __name__ == "__main__":

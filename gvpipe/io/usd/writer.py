@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gvpipe.asset.material import Image
 from gvpipe.foundation import notes
 from gvpipe.foundation.arrays import Float32
 from gvpipe.foundation.atomic import atomic_path, temporary_folder, unnamed_path
@@ -30,6 +32,7 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
 ROOT = "root"  # of meshes that have no common node
+StageMaker = Callable[[Path, str], tuple[str, ...]]  # writes a stage, given the folder of its images
 CLOSE = 1e-4  # time codes: programs cut 0.9999988, which a float32 start time gives, down to 0
 
 
@@ -43,23 +46,43 @@ def write_usd(sequence: MeshSequence, path: Path, skin: Skin | None = None) -> t
         InputError: usd-core is missing, or a position is not finite.
         OutputError: the file cannot be written.
     """
+    names = image_names(sequence)
+
+    def make(stage: Path, textures: str) -> tuple[str, ...]:
+        return write_stage(sequence, stage, path.stem, textures, skin, names)
+
+    return write_folder(make, dict(zip(names, sequence.images, strict=True)), path)
+
+
+def write_folder(make: StageMaker, images: Mapping[str, Image], path: Path) -> tuple[str, ...]:
+    """Write a stage with the images beside it, or both into one .usdz; returns what the first function returns.
+
+    Args:
+        make: writes the stage to a path that exists, given the folder of the images.
+        images: by the names of their files.
+        path: of the result.
+
+    Raises:
+        InputError: usd-core is missing, or as ``make``.
+        OutputError: a file cannot be written.
+    """
     try:
         from pxr import Tf
     except ImportError as exc:
         raise InputError(f"{path}: {EXTRA}") from exc
     try:
         if path.suffix.lower() == ".usdz":
-            return _write_package(sequence, path, skin)
+            return _write_package(make, images, path)
         with atomic_path(path) as temporary:
             folder = path.with_name(f"{path.stem}_textures")
-            said = _write_stage(sequence, temporary, path.stem, folder.name, skin)
-        _write_images(sequence, folder)
+            said = make(temporary, folder.name)
+        _write_images(images, folder)
     except (Tf.ErrorException, RuntimeError) as exc:
         raise OutputError(f"cannot write {path}: {reason_of(exc)}; check the folder and the disk") from exc
     return said
 
 
-def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tuple[str, ...]:
+def _write_package(make: StageMaker, images: Mapping[str, Image], path: Path) -> tuple[str, ...]:
     """A .usdz: a binary stage first, then its textures, neither compressed."""
     from pxr import Sdf, Usd
 
@@ -67,13 +90,13 @@ def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tup
     with temporary_folder() as held:
         folder = Path(held)
         stage = folder / "scene.usdc"
-        said = _write_stage(sequence, stage, path.stem, "textures", skin)
-        _write_images(sequence, folder / "textures")
+        said = make(stage, "textures")
+        _write_images(images, folder / "textures")
         with atomic_path(path) as temporary:
             package = folder / "package.usdz"
             writer = zip_writer.CreateNew(str(package))
             writer.AddFile(str(stage), f"{identifier(path.stem)}.usdc")
-            for name in image_names(sequence):
+            for name in images:
                 writer.AddFile(str(folder / "textures" / name), f"textures/{name}")
             writer.Save()
             del writer
@@ -81,12 +104,22 @@ def _write_package(sequence: MeshSequence, path: Path, skin: Skin | None) -> tup
     return said
 
 
-def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None) -> tuple[str, ...]:
+def write_stage(
+    sequence: MeshSequence, path: Path, name: str, textures: str, skin: Skin | None, pictures: Sequence[str]
+) -> tuple[str, ...]:
+    """Write a stage alone; returns what the format cannot hold.
+
+    Args:
+        sequence, path, skin: as of `write_usd`.
+        name: of a mesh without one.
+        textures: the folder of the images, as the stage names it.
+        pictures: names of the images' files.
+    """
     from pxr import Gf, UsdGeom, UsdSkel
 
     stage: Any = _new_stage(path)
     about = sequence.metadata
-    start = _first_code(about.start_time, sequence.fps)
+    start = first_code(about.start_time, sequence.fps)
     stage.SetTimeCodesPerSecond(sequence.fps)
     stage.SetFramesPerSecond(sequence.fps)
     stage.SetStartTimeCode(start)
@@ -103,7 +136,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     stage.SetDefaultPrim(top)
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
-    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, image_names(sequence))
+    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, list(pictures))
     normals = SceneNormals(sequence, "USD")
     attributes = {name: each for name, each in normals.attributes.items() if name not in normals.fields}
     names = primvar_names({**attributes, **normals.fields})
@@ -136,7 +169,7 @@ def _write_stage(sequence: MeshSequence, path: Path, name: str, textures: str, s
     return (*dict.fromkeys(said), *renamed_note(parts, "USD"), *_notes(sequence, meshes, skin is not None))
 
 
-def _first_code(start_time: float, fps: float) -> float:
+def first_code(start_time: float, fps: float) -> float:
     """The time code of a second: a whole number if it is close to one, else with six decimals."""
     code = start_time * fps
     return float(np.rint(code)) if abs(code - np.rint(code)) < CLOSE else float(np.rint(code * 1e6) / 1e6)
@@ -273,14 +306,14 @@ def image_names(sequence: MeshSequence) -> list[str]:
     return result
 
 
-def _write_images(sequence: MeshSequence, folder: Path) -> None:
-    if not sequence.images:
+def _write_images(images: Mapping[str, Image], folder: Path) -> None:
+    if not images:
         return
     try:
         folder.mkdir(exist_ok=True)
     except OSError as exc:
         raise OutputError(f"cannot write {folder}: {exc.strerror}; choose another folder") from exc
-    for name, image in zip(image_names(sequence), sequence.images, strict=True):
+    for name, image in images.items():
         with unnamed_path(folder / name) as temporary:
             temporary.write_bytes(image.data)
 

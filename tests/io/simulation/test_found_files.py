@@ -88,3 +88,29 @@ def test_binary_ucd_files_are_told_from_abaqus_ones(tmp_path: Path) -> None:
     (tmp_path / "a.inp").write_bytes(b"\x07\x00\x00\xea\xff\x80\x81")
     with pytest.raises(InputError, match="it is no text, as meshio needs it"):
         gvpipe.read(tmp_path / "a.inp")
+
+
+def test_steps_of_several_parts_that_share_their_cells(tmp_path: Path) -> None:
+    """As VTK's warping_spheres.vtkhdf: sizes of the parts of all steps, and cells that are there once."""
+    h5py = pytest.importorskip("h5py")
+    one = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    points = np.concatenate([one + np.array([x, 0, step]) for step in range(3) for x in (0, 5)]).astype(np.float32)
+    with h5py.File(tmp_path / "a.vtkhdf", "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array([2, 0])
+        root.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", 8))
+        root["Points"], root["NumberOfPoints"] = points, [3] * 6
+        for name in ("Vertices", "Lines", "Polygons", "Strips"):
+            count = int(name == "Polygons")
+            group = root.create_group(name)
+            group["NumberOfCells"], group["NumberOfConnectivityIds"] = [count] * 6, [3 * count] * 6
+            group["Offsets"] = np.array([0, 3, 0, 3] if count else [0, 0])
+            group["Connectivity"] = np.array([0, 1, 2, 0, 2, 1] if count else [], np.int64)
+        steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = 3
+        steps["Values"], steps["NumberOfParts"] = [0.0, 0.5, 1.0], [2] * 3
+        steps["PartOffsets"], steps["PointOffsets"] = [0, 2, 4], [0, 6, 12]
+        steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = np.zeros((3, 4), np.int64)
+    found = gvpipe.read(tmp_path / "a.vtkhdf")
+    assert found.faces.tolist() == [[0, 1, 2], [3, 5, 4]] and found.fps == 2
+    assert np.array_equal(found[:].reshape(-1, 3), points)

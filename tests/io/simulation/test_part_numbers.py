@@ -96,7 +96,7 @@ print(json.dumps({"times": times, "names": names, "points": blocks, "heat": fiel
 
 
 @pytest.mark.parametrize("is_shared", [False, True])
-@pytest.mark.parametrize("name", ["a.pvd", "a_%02d.vtp", "a_%02d.vtu", "a.vtkhdf"])
+@pytest.mark.parametrize("name", ["a.pvd", "a_%02d.vtp", "a_%02d.vtu", "a.vtkhdf", "a.xdmf"])
 def test_parts_come_back(name: str, is_shared: bool, tmp_path: Path) -> None:
     heat = gvpipe.Field(np.arange(36, dtype=np.float32).reshape(3, 12), "vertex")
     given = three_squares(is_shared, fields={"heat": heat})
@@ -196,7 +196,7 @@ def solid(with_flat: bool = True) -> gvpipe.MeshSequence:
 
 
 @pytest.mark.parametrize("with_flat", [True, False])
-@pytest.mark.parametrize("name", ["a.pvd", "a_%d.vtu", "a.vtkhdf"])
+@pytest.mark.parametrize("name", ["a.pvd", "a.xdmf", "a_%d.vtu", "a.vtkhdf"])
 def test_blocks_of_volumes_come_back(name: str, with_flat: bool, tmp_path: Path) -> None:
     given = solid(with_flat)
     assert not any("parts" in note for note in gvpipe.write(given, tmp_path / name))

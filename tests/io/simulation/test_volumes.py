@@ -13,7 +13,7 @@ from folders import ROOT
 
 import gvpipe
 from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, ORDER, POINTS, SECTION, VolumeList, pack_volume
-from gvpipe.asset_coding.volume_reader import read_volume
+from gvpipe.asset_coding.volume_reader import read_volume, read_volume_list
 from gvpipe.connectivity.cell_traversal import decode_walk, encode_walk
 from gvpipe.connectivity.cells import decode_cells, decode_order, encode_cells, encode_order
 from gvpipe.container.mp4 import read_file
@@ -382,3 +382,22 @@ def test_times_of_parts_follow(tmp_path: Path, run: Any) -> None:
     for options in (("--start", "3"), ("--frames", "3:")):
         assert run("convert", source, tmp_path / "out.pvd", *options).status == 0
         assert gvpipe.read(tmp_path / "out.pvd").times.tolist() == [3, 4, 5]
+
+
+def test_numbers_inside_have_the_surface_s_bound(tmp_path: Path) -> None:
+    """Of a field whose numbers grow: the range of all frames counts, inside as on the surface."""
+    sequence = block()
+    volume = volume_of(sequence)
+    grows = np.arange(1, N_FRAMES + 1, dtype=np.float32)[:, None] ** 3
+    surface = gvpipe.Field((np.asarray(sequence.fields["heat"][:]) * grows).astype(np.float32))
+    inner = gvpipe.Field((np.asarray(volume.point_fields["heat"][:]) * 0.01).astype(np.float32), "point")
+    changed = replace(
+        sequence, fields={**sequence.fields, "heat": surface}, volume=replace(volume, point_fields={"heat": inner})
+    )
+    gvpipe.encode(changed, tmp_path / "a.mp4", "pca")
+    with gvpipe.open(tmp_path / "a.mp4") as video:
+        bounds = {each.name: each.bound for each in video.directory.fields}
+        listed = read_volume_list(video.bitstream)
+    assert listed is not None
+    (heat,) = [each for each in listed.numbers if each.name == "heat"]
+    assert heat.bound == pytest.approx(bounds["heat"], rel=0.01)  # inside, numbers go a little lower

@@ -19,7 +19,7 @@ const OPTIONS = { imageOrientation: "none", premultiplyAlpha: "none", colorSpace
 
 export class Textures {
   #bitmaps = new Map(); // image -> ImageBitmap, null if it cannot be shown
-  #made = [];
+  #made = new Map(); // by what they are of
 
   /**
    * @param {{name: string, mediaType: string, data: Uint8Array}[]} images of the video
@@ -51,6 +51,12 @@ export class Textures {
   make(texture, channels, isColour) {
     const bitmap = texture && this.#bitmaps.get(texture.image);
     if (!bitmap || !channels.has(texture.uv)) return null;
+    const key = JSON.stringify([texture, channels.get(texture.uv), isColour]);
+    if (!this.#made.has(key)) this.#made.set(key, this.#make(texture, bitmap, channels, isColour));
+    return this.#made.get(key);
+  }
+
+  #make(texture, bitmap, channels, isColour) {
     const made = new Texture(bitmap);
     made.flipY = false; // coordinates are turned instead, as glTF has them
     made.channel = channels.get(texture.uv);
@@ -65,16 +71,21 @@ export class Textures {
     made.matrixAutoUpdate = false; // three.js turns before it tiles, glTF after
     made.matrix.set(x * c, y * s, texture.offset[0], -x * s, y * c, texture.offset[1], 0, 0, 1);
     made.needsUpdate = true;
-    this.#made.push(made);
     return made;
   }
 
   dispose() {
-    for (const texture of this.#made) texture.dispose();
+    for (const texture of this.#made.values()) texture.dispose();
     for (const bitmap of this.#bitmaps.values()) bitmap?.close();
-    this.#made = [];
+    this.#made.clear();
     this.#bitmaps.clear();
   }
+}
+
+/** The images that materials of a video show, decoded. @returns {Promise<Textures>} */
+export function openTextures({ materials, images }, anisotropy) {
+  const textures = materials.flatMap((material) => Object.values(material).filter((value) => value?.uv !== undefined));
+  return Textures.open(images, new Set(textures.map(({ image }) => image)), anisotropy);
 }
 
 async function decode(blob) {

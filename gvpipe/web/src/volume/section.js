@@ -63,12 +63,14 @@ export class Section {
 
   /** The triangle of a tetrahedron with one corner on a side, or the two of one with two. */
   #cutOne(nodes, start, tetrahedra, first, cell) {
-    const sorted = this.#corners; // those below, then those above
-    let [below, above] = [0, 4];
+    const sorted = this.#corners; // those below, then those above, each in order
+    let below = 0;
+    for (let i = 0; i < 4; i++) if (this.#heights[nodes[start + tetrahedra[first + i]]] <= 0) below++;
+    let [low, high] = [0, below];
     for (let i = 0; i < 4; i++) {
       const node = nodes[start + tetrahedra[first + i]];
-      if (this.#heights[node] <= 0) sorted[below++] = node;
-      else sorted[--above] = node;
+      if (this.#heights[node] <= 0) sorted[low++] = node;
+      else sorted[high++] = node;
     }
     const [a, b, c, d] = sorted;
     if (below === 2) {

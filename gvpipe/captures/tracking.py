@@ -1,0 +1,172 @@
+"""Captures whose frames have meshes of their own, with long shots in their place: one mesh follows the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from gvpipe.asset.attribute import Attribute
+from gvpipe.following import Run, follow, places_on
+from gvpipe.following.follow import MAX_ERROR, RMS
+from gvpipe.foundation.arrays import Array, Float64, Int32
+from gvpipe.foundation.notes import count
+from gvpipe.foundation.progress import Progress
+from gvpipe.model.capture import Capture
+from gvpipe.model.sequence import MeshSequence
+
+LONG = 8  # frames of a shot that is kept as it is
+COLOUR = "color"
+SHARE = 0.6  # of a largest distance that is asked for: what following may use, and coding the rest
+RMS_SHARE = 0.3  # of the same: the greatest rms
+CODED_RMSE = (
+    0.0005  # of vertices, part of the diagonal: as far off the surface as `RMS`, since most of it lies along the surface
+)
+SURFACE_ALONE = "only the surface is followed"
+
+Targets = tuple[float | None, float | None, float | None, float | str | None]
+"""Largest rmse, KG error, bits per vertex and frame, and error of a vertex."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A capture whose short shots were followed.
+
+    Args:
+        capture: the shots that there are now.
+        keys: of each shot, the frame of the capture that its mesh comes from; None: it is as it came.
+        notes: what a user should know, a line each.
+    """
+
+    capture: Capture
+    keys: tuple[int | None, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def is_any(self) -> bool:
+        """Whether a shot was followed."""
+        return any(key is not None for key in self.keys)
+
+
+def coding_targets(targets: Targets, is_followed: bool) -> Targets:
+    """The targets of coding: of a largest distance, the part that following leaves."""
+    rmse, kg, bpvf, bound = targets
+    if bound is None or not is_followed:
+        return targets
+    text = str(bound).strip()
+    rest = (1 - SHARE) * float(text.removesuffix("%"))
+    return rmse, kg, bpvf, f"{rest!r}%" if text.endswith("%") else rest
+
+
+def is_tracked_by_default(capture: Capture) -> bool:
+    """Whether most frames have a connectivity of their own, and nothing but a colour would be lost by following."""
+    alone = sum(length == 1 for length in capture.lengths)
+    return len(capture) > 2 and 2 * alone > len(capture) and not what_is_lost(capture.shots[0])
+
+
+def what_is_lost(shot: MeshSequence) -> list[str]:
+    """What following leaves behind of a shot, by name."""
+    lost = [name for name in shot.attributes if name != COLOUR] + list(shot.fields)
+    lost += [f"{len(shot.parts)} parts"] if len(shot.parts) > 1 else []
+    lost += ["materials"] if shot.images else []
+    lost += ["the volume"] if shot.volume is not None else []
+    return lost
+
+
+def track(capture: Capture, max_error: float | None, vertices: int | None, progress: Progress) -> Tracked:
+    """Follow the surface through shots of fewer than `LONG` frames; longer ones stay as they are.
+
+    Args:
+        capture: what is followed.
+        max_error: greatest distance of the decoded surface, part of the first frame's diagonal; None: that of `follow`.
+        vertices: of each key mesh; None: as few as the distance allows.
+        progress: called with ``"follow"``.
+
+    Raises:
+        InputError: a frame cannot be read.
+        OutputError: the temporary folder is full.
+    """
+    bound = MAX_ERROR if max_error is None else SHARE * max_error
+    rms = RMS if max_error is None else min(RMS, RMS_SHARE * max_error)
+    shots: list[MeshSequence] = []
+    keys: list[int | None] = []
+    progress("follow", 0.0)
+    worst_rms, worst, followed, has_colours = 0.0, 0.0, 0, False
+    for is_long, span in _stretches(capture):
+        if is_long:
+            shots += [capture.shots[number] for number in span]
+            keys += [None] * len(span)
+            continue
+        start, stop = capture.starts[span[0]], capture.starts[span[-1]] + capture.lengths[span[-1]]
+        frames = CaptureFrames(capture.part(start, stop))
+        for run in follow(frames, max_error=bound, rms=rms, vertices=vertices, progress=progress):
+            keys.append(None if run.key is None else start + run.key)
+            shots.append(capture.frame(start + run.start) if run.key is None else _shot(capture, start, run, frames.origin))
+            has_colours = has_colours or (run.key is not None and COLOUR in shots[-1].attributes)
+            if run.key is not None:
+                followed += run.stop - run.start
+                worst_rms = max(worst_rms, *(error.rms for error in run.errors))
+                worst = max(worst, *(error.largest for error in run.errors))
+    notes = []
+    if followed:
+        runs = sum(key is not None for key in keys)
+        distance = f"rms {worst_rms:.2g}, at most {worst:.2g} of the diagonal"
+        alone = len(capture) - followed
+        notes.append(
+            f"{count(followed, 'frame')} follow {count(runs, 'key mesh', 'key meshes')}: {distance}; "
+            f"{alone} are as they came (--track off: all)"
+        )
+        notes += ["colours are those of the key meshes, all through their shots"] if has_colours else []
+        lost = what_is_lost(capture.shots[0])
+        notes += [f"{SURFACE_ALONE}; left out: {', '.join(lost)}"] if lost else []
+    found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
+    return Tracked(found, tuple(keys), tuple(notes))
+
+
+class CaptureFrames:
+    """The meshes of a capture's frames, positions relative to the first one's origin."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture = capture
+        self.origin = capture.shots[0].origin
+
+    def __len__(self) -> int:
+        return len(self._capture)
+
+    def __getitem__(self, frame: int) -> tuple[Array, Int32]:
+        number, own = self._capture.locate(frame)
+        shot = self._capture.shots[number]
+        return shot.read_absolute(own, own + 1)[0] - self.origin, shot.faces
+
+
+def _stretches(capture: Capture) -> Iterator[tuple[bool, list[int]]]:
+    """Numbers of shots in a row that are all long, or all short."""
+    for is_long, numbers in groupby(range(len(capture.shots)), lambda number: capture.lengths[number] >= LONG):
+        yield is_long, list(numbers)
+
+
+def _shot(capture: Capture, start: int, run: Run, origin: Float64) -> MeshSequence:
+    """A run of ``capture`` whose first frame is ``start + run.start``, with the colours of its key frame."""
+    assert run.key is not None
+    key = capture.frame(start + run.key)
+    first = capture.frame(start + run.start)
+    attributes = {}
+    if COLOUR in key.attributes and key.attributes[COLOUR].domain == "vertex":
+        given = key.attributes[COLOUR]
+        own = np.asarray(run.positions[run.key - run.start : run.key - run.start + 1])[0]
+        places = places_on(own, run.faces, key.read_absolute(0, 1)[0] - origin, key.faces)
+        attributes[COLOUR] = _sampled(given, places.of_vertices(np.asarray(given), key.faces))
+    metadata = first.metadata
+    if metadata.times:
+        times = tuple(float(capture.frame(start + k).times[0]) for k in range(run.start, run.stop))
+        metadata = replace(metadata, times=times)
+    return MeshSequence(run.positions, run.faces, capture.fps, attributes, capture.name, origin, metadata=metadata)
+
+
+def _sampled(given: Attribute, values: Array) -> Attribute:
+    """An attribute with other values, in its own type."""
+    kind = given.values.dtype
+    rounded = np.rint(values) if kind.kind in "iu" else values
+    return Attribute(rounded.astype(kind), given.domain)
