@@ -21,6 +21,7 @@ import numpy as np
 
 import gvpipe
 from gvpipe.following import Run, follow
+from gvpipe.following.distance import SurfaceError
 from gvpipe.following.key_mesh import key_mesh
 from gvpipe.following.surface import Surface
 from gvpipe.foundation.arrays import Array, Float64, Int32
@@ -122,7 +123,7 @@ def _code(runs: list[Run], codec: str, kg: float) -> tuple[int, list[Mesh]]:
 def _draco(mesh: Mesh, bits: int, rms: float, diagonal: float) -> bytes:
     points, faces = mesh
     if rms:
-        surface = key_mesh(Surface(points, faces), diagonal, rms, None)
+        surface = key_mesh(Surface(points, faces), diagonal, SurfaceError(rms, np.inf), None)
         points, faces = surface.positions, surface.faces
     coded: bytes = DracoPy.encode(points, faces, quantization_bits=bits, compression_level=10)
     return coded

@@ -14,7 +14,7 @@ from gvpipe.following.fit import Goal, MovedMesh
 from gvpipe.following.key_mesh import decimated
 from gvpipe.following.stages import MOTION
 from gvpipe.following.surface import Surface, vertex_normals
-from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.arrays import Float64, Int32
 
 N_VERTICES = 1000
 N_SAMPLES = 8000  # of a frame's surface
@@ -30,10 +30,7 @@ class Cage:
     """
 
     def __init__(self, key: Surface, diagonal: float) -> None:
-        coarse = decimated(key, N_VERTICES) if len(key.positions) > N_VERTICES else key
-        nearest = np.asarray(cKDTree(key.positions).query(coarse.positions)[1])
-        kept = nearest[coarse.faces]  # (T, 3)
-        kept = kept[(kept[:, 0] != kept[:, 1]) & (kept[:, 1] != kept[:, 2]) & (kept[:, 0] != kept[:, 2])]
+        kept = _coarse(key) if len(key.positions) > N_VERTICES else key.faces
         self._nodes, faces = np.unique(kept, return_inverse=True)
         self._faces = faces.reshape(-1, 3).astype(np.int32)
         self._mesh = MovedMesh(key.positions[self._nodes], self._faces, diagonal)
@@ -63,3 +60,14 @@ class Cage:
             turned = np.einsum("vab,vb->va", rotations[node], last - rest[node]) + moved[node]
             result += self._weights[:, corner, None] * turned
         return result
+
+
+def _coarse(key: Surface) -> Int32:
+    """Triangles ``(T, 3)`` between about `N_VERTICES` of the key's vertices, or its own if these are too few for any."""
+    coarse = decimated(key, N_VERTICES)
+    if coarse.is_empty:
+        return key.faces
+    nearest = np.asarray(cKDTree(key.positions).query(coarse.positions)[1])
+    faces = nearest[coarse.faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])]
+    return faces.astype(np.int32) if len(faces) else key.faces

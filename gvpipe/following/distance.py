@@ -23,6 +23,10 @@ class SurfaceError(NamedTuple):
     rms: float
     largest: float
 
+    def is_within(self, limit: SurfaceError) -> bool:
+        """Whether neither part is beyond the limit's."""
+        return self.rms <= limit.rms and self.largest <= limit.largest
+
 
 def surface_error(one: Surface, other: Surface, diagonal: float) -> SurfaceError:
     """The distance between two surfaces, neither of them empty, as parts of ``diagonal``, which is in model units."""

@@ -73,17 +73,21 @@ def _runs(frames: MeshFrames, error: SurfaceError, vertices: int | None, progres
     n_frames = len(frames)
     limits = Limits(_diagonal(frames), error, vertices)
 
+    start, furthest = 0, 0
+
     def read(frame: int) -> Surface:
+        nonlocal furthest
+        furthest = max(furthest, frame)
+        progress("follow", furthest / n_frames)
         return Surface(*read_frame(frames, frame))
 
-    start = 0
     while start < n_frames:
         run = one_blas_thread(grow_run)(read, start, n_frames, limits)
         if run is None:
             run = kept_run(start, *read_frame(frames, start))
         yield run
         start = run.stop
-        progress("follow", start / n_frames)
+    progress("follow", 1.0)
 
 
 def read_frame(frames: MeshFrames, frame: int) -> tuple[Float64, Int32]:

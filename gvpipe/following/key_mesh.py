@@ -4,37 +4,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvpipe.following.distance import surface_error
+from gvpipe.following.distance import SurfaceError, surface_error
 from gvpipe.following.surface import Surface
 
 TRIALS = 5  # decimations at most
-CLOSE = 0.9  # a key whose error is this part of the wanted one, or more, is coarse enough
+CLOSE = 0.88  # a key whose error is this part of the wanted one, or more, is coarse enough
+AIM = 0.95  # part of the wanted error that trials aim at
 LEAST = 8  # vertices
 
 
-def key_mesh(surface: Surface, diagonal: float, rms: float, n_vertices: int | None) -> Surface:
-    """A surface of about ``n_vertices``, or of so few that its distance is ``rms``, a part of ``diagonal``.
+def key_mesh(surface: Surface, diagonal: float, limit: SurfaceError, n_vertices: int | None) -> Surface:
+    """A surface of about ``n_vertices``, or of so few that its distance, both ways, is within a limit.
 
     Args:
         surface: not empty; it is returned itself where nothing can be left out.
         diagonal: model units.
-        rms: root mean square distance, both ways.
+        limit: parts of ``diagonal``.
         n_vertices: asks for a number instead.
     """
     if n_vertices is not None:
-        return surface if n_vertices >= len(surface.positions) else decimated(surface, n_vertices)
+        trial = decimated(surface, n_vertices) if n_vertices < len(surface.positions) else surface
+        return surface if trial.is_empty else trial
     best, low, high = surface, 0.0, float(len(surface.positions))
     n = high / 3
     for _ in range(TRIALS):
         trial = decimated(surface, max(LEAST, round(n)))
-        error = surface_error(trial, surface, diagonal).rms
-        if error <= rms:
+        error = SurfaceError(np.inf, np.inf) if trial.is_empty else surface_error(trial, surface, diagonal)
+        if error.is_within(limit):
             best, high = trial, n
-            if error >= CLOSE * rms:
+            if error.rms >= CLOSE * limit.rms:
                 break
         else:
             low = n
-        guess = n * error / rms  # the error falls about as the number grows
+        guess = n * error.rms / (AIM * limit.rms)  # the error falls about as the number grows
         n = guess if low < guess < high else (low + high) / 2
         if high - low < 1 or n < LEAST:
             break

@@ -4,7 +4,7 @@
 2. The frame that failed becomes the key. If it can be followed back to the run's first frame, it is followed on from there, and
    step 2 is repeated from where that fails. So a key tends to the middle of its run, and a surface that touches itself, which
    cannot be followed to where it parts, has a key from where it is apart.
-3. Otherwise the run ends there.
+3. Otherwise, or where the run is long, it ends there.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from gvpipe.following.key_mesh import key_mesh
 from gvpipe.following.stages import SURFACE
 from gvpipe.following.stored import RunPositions, StoredFrames
 from gvpipe.following.surface import Moved, Surface
-from gvpipe.following.tracking import Track, is_within
+from gvpipe.following.tracking import Track
 from gvpipe.foundation.arrays import Float64, Frames, Int32
 
-KEY_SHARE = 0.45  # of the rms that a followed frame may have: what a key's own may be
+KEY_SHARE = 0.45  # of the errors that a followed frame may have: what a key's own may be
 GIVEN_VERTICES = 1.5  # where the number of vertices is given, frames may have this many times the key's rms
-MOST_KEYS = 4  # that are tried for one run
+MOST_KEYS = 3  # that are tried for one run
+LONG = 64  # frames: a run of so many gains little from another key
 
 
 @dataclass(frozen=True)
@@ -79,18 +80,19 @@ class Growth:
 
     def __init__(self, frame: int, surface: Surface, limits: Limits) -> None:
         self.frame, self._diagonal = frame, limits.diagonal
-        key = key_mesh(surface, limits.diagonal, KEY_SHARE * limits.error.rms, limits.n_vertices)
+        share = SurfaceError(KEY_SHARE * limits.error.rms, KEY_SHARE * limits.error.largest)
+        key = key_mesh(surface, limits.diagonal, share, limits.n_vertices)
         self.faces = key.faces
         self._mesh = MovedMesh(key.positions, key.faces, limits.diagonal)
         self._positions = self._mesh.fit(key.positions, key.positions, Goal(surface), SURFACE)
         self._cage = Cage(Moved(self._positions, self.faces), limits.diagonal)
         error = surface_error(Moved(self._positions, self.faces), surface, limits.diagonal)
         unfitted = surface_error(key, surface, limits.diagonal)
-        if (not is_within(unfitted, limits.error), unfitted) < (not is_within(error, limits.error), error):
+        if (not unfitted.is_within(limits.error), unfitted) < (not error.is_within(limits.error), error):
             self._positions, error = key.positions, unfitted
         rms = limits.error.rms if limits.n_vertices is None else max(limits.error.rms, GIVEN_VERTICES * error.rms)
         self._limit = SurfaceError(rms, limits.error.largest)
-        self.is_within = is_within(error, self._limit)
+        self.is_within = error.is_within(self._limit)
         self._before, self._after = StoredFrames(len(key.positions)), StoredFrames(len(key.positions))
         self._after.append(self._positions)
         self._errors_before: list[SurfaceError] = []
@@ -134,7 +136,7 @@ def grow_run(read: Callable[[int], Surface], start: int, n_frames: int, limits: 
         return None
     best.extend(read, n_frames)
     for _ in range(MOST_KEYS - 1):
-        if best.stop >= n_frames:
+        if best.stop >= n_frames or best.stop - start >= LONG:
             break
         surface = read(best.stop)
         if surface.is_empty:

@@ -38,10 +38,10 @@ class Track:
         for expected in [self._last + moves, self._last] if moves.any() else [self._last]:
             found = self._mesh.fit(self._cage.carry(expected, self._last, goal), self._last, goal, SURFACE)
             error = self._error(found, surface)
-            if not is_within(error, limit) and error.rms < HOPELESS * limit.rms:
+            if not error.is_within(limit) and error.rms < HOPELESS * limit.rms:
                 found = self._mesh.fit(found, found, goal, REPAIR)
                 error = self._error(found, surface)
-            if is_within(error, limit):
+            if error.is_within(limit):
                 self._last, self._before = found, self._last
                 return found, error
             if error.rms <= limit.rms:  # the motion was found; from elsewhere it would be found again
@@ -50,8 +50,3 @@ class Track:
 
     def _error(self, positions: Float64, surface: Surface) -> SurfaceError:
         return surface_error(Moved(positions, self._mesh.faces), surface, self._diagonal)
-
-
-def is_within(error: SurfaceError, limit: SurfaceError) -> bool:
-    """Whether neither part is beyond the limit's."""
-    return error.rms <= limit.rms and error.largest <= limit.largest
