@@ -77,17 +77,24 @@ async function read(path) {
   size = pictureSize(file);
   const video = await GeometryVideo.load(new Uint8Array(file));
   try {
-    const { frameCount, vertexCount, indices } = video;
-    for (const vertex of indices) if (vertex >= vertexCount) return `triangles refer to vertex ${vertex} of ${vertexCount}`;
-    const count = Math.max(1, Math.min(frameCount, Math.floor(MOST_VALUES / (3 * vertexCount))));
-    for (const k of [...Array(count).keys(), frameCount - 1]) {
-      if (!(await video.frame(k)).every(Number.isFinite)) return "positions are not finite";
+    const { frameCount } = video;
+    let left = MOST_VALUES;
+    let shot = -1;
+    for (const k of [...Array(frameCount).keys(), frameCount - 1]) {
+      if (left < 0 && k < frameCount - 1) continue;
+      const positions = await video.frame(k);
+      left -= positions.length;
+      if (!positions.every(Number.isFinite)) return "positions are not finite";
+      if (video.shot === shot) continue;
+      shot = video.shot;
+      const { vertexCount, indices } = video;
+      for (const vertex of indices) if (vertex >= vertexCount) return `triangles refer to vertex ${vertex} of ${vertexCount}`;
     }
     if (![...video.bounds.min, ...video.bounds.max].every(Number.isFinite)) return "bounds are not finite";
     for (const { values } of video.attributes.values()) {
       if (!values.every(Number.isFinite)) return "an attribute is not finite";
     }
-    for (const field of video.fields.values()) for (const k of [0, frameCount - 1]) await field.frame(k);
+    for (const field of video.fields.values()) for (const k of [0, field.frameCount - 1]) await field.frame(k);
     return "";
   } finally {
     video.close();

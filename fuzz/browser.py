@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import gvpipe
+from fuzz.captures import capture_target
 from fuzz.live import live_target
 from fuzz.parts import BrokenPromise, Seed, Target
 from fuzz.streams import stream_target
@@ -103,13 +104,19 @@ def _unlimited() -> None:
 _nodes = threading.local()
 
 
-def browser_targets(seeds: tuple[Seed, ...], streams: tuple[Seed, ...] = (), growing: tuple[Seed, ...] = ()) -> list[Target]:
+def browser_targets(
+    seeds: tuple[Seed, ...],
+    streams: tuple[Seed, ...] = (),
+    growing: tuple[Seed, ...] = (),
+    captures: tuple[Seed, ...] = (),
+) -> list[Target]:
     """The parsers of geometry videos as browsers have them; none without Node, or on Windows, where pipes cannot be polled."""
     if shutil.which("node") is None or sys.platform == "win32":
         return []
     played = tuple(seed for seed in seeds if json.loads(seed.parts[JSON])["codec"] in READ)
     flowing = tuple(seed for seed in streams if json.loads(seed.parts[HEADER])["codec"] in READ)
-    targets = [target for target in (*video_targets(played), stream_target(flowing), live_target(growing)) if target.seeds]
+    made = (*video_targets(played), stream_target(flowing), live_target(growing), capture_target(captures))
+    targets = [target for target in made if target.seeds]
     return [
         dataclasses.replace(target, name=PREFIX + target.name, parse=_parse, refusal=(RefusedByPlayer,)) for target in targets
     ]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import gvpipe
+from fuzz.captures import split_capture
 from fuzz.live import split_live
 from fuzz.mesh_files import CACHES, MESH
 from fuzz.parts import Parts, Seed
@@ -68,6 +69,18 @@ def load_seeds(
         if kind in formats and path.is_file() and path.stat().st_size <= LARGEST:
             formats[kind] = (*formats[kind], Seed(path.name, {f"a{path.suffix.lower()}": path.read_bytes()}))
     return seeds, streams, formats
+
+
+def load_captures(folder: Path) -> tuple[Seed, ...]:
+    """Captures whose shots share a picture; made there if they are missing."""
+    folder = folder / "captures"
+    if not folder.exists():
+        folder.mkdir(parents=True)
+        picture = gvpipe.Image("noise", "image/png", b"\x89PNG\r\n\x1a\n" + bytes(range(200)))
+        for codec in ("pca", "pdct"):
+            shots = [replace(each, fps=24.0, images=(picture,)) for each in _samples().values()]
+            gvpipe.encode(gvpipe.Capture(shots, "samples"), folder / f"{codec}.mp4", codec)
+    return tuple(Seed(path.stem, split_capture(path.read_bytes())) for path in sorted(folder.glob("*.mp4")))
 
 
 def load_live(folder: Path) -> tuple[Seed, ...]:

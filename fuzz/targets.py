@@ -54,10 +54,11 @@ def load_targets(options: Options) -> list[Target]:
     if options.loader is not None:
         return options.loader(options)
     from fuzz.browser import browser_targets
+    from fuzz.captures import capture_target
     from fuzz.companions import companion_seeds, companion_target
     from fuzz.live import live_target
     from fuzz.mesh_files import mesh_targets
-    from fuzz.seeds import ROOT, TESTS, load_live, load_seeds
+    from fuzz.seeds import ROOT, TESTS, load_captures, load_live, load_seeds
     from fuzz.shards import shard_seeds, shard_target
     from fuzz.strange import strange_targets
     from fuzz.streams import stream_target
@@ -68,7 +69,7 @@ def load_targets(options: Options) -> list[Target]:
 
         refuse_bad_indices()
     videos, streams, meshes = load_seeds(Path(options.seeds), Path(options.more) if options.more else None)
-    growing = load_live(Path(options.seeds))
+    growing, captures = load_live(Path(options.seeds)), load_captures(Path(options.seeds))
     shards = shard_seeds([TESTS / "golden" / f"{name}.mp4" for name in ("pca-1-kalman", "pca-1-still", "pdct-1")])
     kinds = {
         "video": [
@@ -77,9 +78,10 @@ def load_targets(options: Options) -> list[Target]:
             live_target(growing),
             shard_target(shards),
             companion_target(companion_seeds(TESTS / "golden" / "pdct-1.mp4", ROOT / "samples" / "voice.wav")),
+            capture_target(captures),
         ],
         "mesh": mesh_targets(meshes),
-        "web": browser_targets(videos, streams, growing),
+        "web": browser_targets(videos, streams, growing, captures),
         "strange": strange_targets((TESTS / "golden" / "pdct-1.mp4").read_bytes()),
     }
     targets = [target for kind, group in kinds.items() if options.kind in ("", kind) for target in group]

@@ -28,6 +28,8 @@ LOAD = """const ready = new Promise((resolve, reject) => {
     });
     element.src = args[0];
     await ready;"""
+PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
+Mask = npt.NDArray[np.bool_]
 TEXT = """const text = (array) => {
       let binary = "";
       for (const byte of new Uint8Array(array.buffer)) binary += String.fromCharCode(byte);
@@ -97,3 +99,14 @@ def encode_file(site: tuple[Path, str], sequence: MeshSequence, name: str = "x.m
 
 def flipped(data: bytes, position: int) -> bytes:
     return data[:position] + bytes([data[position] ^ 0x55]) + data[position + 1 :]
+
+
+def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], size: tuple[int, int]) -> Mask:
+    """Which pixels of a picture triangles cover, by the CPU renderer; ``points (V, 2)`` in pixels."""
+    width, height = size
+    flat = np.column_stack([points[:, 0], height - points[:, 1], np.zeros(len(points))]).astype(np.float32)
+    field = 28.0  # degrees; at this distance a unit is a pixel
+    distance = height / 2 / np.tan(np.radians(field) / 2)
+    camera = gvpipe.Camera((width / 2, height / 2, 0.0), distance, azimuth=0.0, elevation=0.0, field_of_view=field)
+    mask: Mask = gvpipe.Renderer(faces, flat, size, samples=1).visible(flat, camera) >= 0
+    return mask

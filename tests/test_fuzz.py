@@ -17,6 +17,7 @@ import gvpipe
 from fuzz import limits
 from fuzz.boxes import parse_boxes
 from fuzz.browser import Node, RefusedByPlayer
+from fuzz.captures import capture_target, split_capture
 from fuzz.companions import companion_seeds, companion_target
 from fuzz.hdf import mutate_hdf
 from fuzz.limits import ACCEPTED, REFUSED, judge
@@ -25,7 +26,7 @@ from fuzz.mesh_files import join_files, mesh_targets, split_files
 from fuzz.mutation import mutate_bytes, mutate_json, mutate_text
 from fuzz.parts import Seed
 from fuzz.reduction import reduce_parts
-from fuzz.seeds import load_live
+from fuzz.seeds import load_captures, load_live
 from fuzz.session import Session
 from fuzz.shards import shard_seeds, shard_target
 from fuzz.strange import strange_targets
@@ -46,6 +47,17 @@ def test_a_video_put_together_is_the_same(path: Path, tmp_path: Path) -> None:
     assert split_video(again.read_bytes()) == parts
     assert np.array_equal(gvpipe.open(again)[:], gvpipe.open(path)[:])
     assert b"".join(box.pack() for box in parse_boxes(parts[VIDEO])) == parts[VIDEO]
+
+
+def test_a_capture_put_together_is_the_same(tmp_path: Path) -> None:
+    seed = load_captures(tmp_path)[0]
+    target = capture_target((seed,))
+    again = write_files(target.join(seed.parts), tmp_path / "case")
+    assert split_capture(again.read_bytes()) == seed.parts and any(name.startswith("shared.") for name in seed.parts)
+    with gvpipe.open_capture(again) as found, gvpipe.open_capture(tmp_path / "captures" / f"{seed.name}.mp4") as wanted:
+        assert all(np.array_equal(found[k], wanted[k]) for k in range(len(wanted)))
+    verdicts = [judge(target, write_files(target.join(target.case(1, k)[1]), tmp_path / "case"), 10**4) for k in range(1, 30)]
+    assert {verdict.kind for verdict in verdicts} == {ACCEPTED, REFUSED}, verdicts
 
 
 def test_a_stream_put_together_is_the_same(tmp_path: Path) -> None:

@@ -6,12 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from gvpipe.coding.codec import Codec
 from gvpipe.coding.registry import segment_parts
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.companion import Companion
 from gvpipe.container.shots import WrittenShots, write_shots
 from gvpipe.foundation.arguments import StrPath
+from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.errors import GvpipeError
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.capture import Capture
@@ -86,6 +89,7 @@ def write_capture(
     count, first = len(capture.shots), capture.shots[0]
     poster = make_poster(first.read(0, 1)[0], first.faces, capture.fps, len(capture))
     coded: list[CodedShot] = []
+    corners: list[Float64] = []
     for number, shot in enumerate(capture.shots):
         try:
             found = code(number, shot, lambda stage, done, number=number: progress(stage, (number + done) / count))  # type: ignore[misc]
@@ -96,10 +100,13 @@ def write_capture(
             bitstream = replace(found.bitstream, is_bare=False, video=found.bitstream.video or poster_of(shot))
             found = replace(found, bitstream=bitstream)
         coded.append(found)
+        corners += [corner + shot.origin for corner in _corners(shot)]
     bitstreams = [shot.bitstream for shot in coded]
     parts = {number: segment_parts(each) for number, each in enumerate(bitstreams) if not each.is_bare}
     progress("write", 0.0)
-    written = write_shots(path, poster, bitstreams, capture.fps, parts, companions)
+    low, high = (choose(corners, axis=0) - first.origin for choose in (np.min, np.max))
+    box = [*low.tolist(), *high.tolist()]
+    written = write_shots(path, poster, bitstreams, capture.fps, parts, companions, box)
     rows = [
         {
             "start": start,
@@ -112,6 +119,13 @@ def write_capture(
         for start, shot, n_bytes in zip(capture.starts, coded, written.n_bytes, strict=True)
     ]
     return WrittenCapture(coded, written, rows)
+
+
+def _corners(shot: MeshSequence) -> list[Float64]:
+    """The smallest and the largest corner of the motion, relative to the shot's origin."""
+    ends = [(chunk.min(axis=(0, 1)), chunk.max(axis=(0, 1))) for _, chunk in shot.chunks()]
+    corners = np.array(ends, np.float64)  # (chunks, 2, 3)
+    return [corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)]
 
 
 def _name(exc: GvpipeError, capture: Capture, number: int) -> None:

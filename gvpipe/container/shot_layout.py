@@ -8,7 +8,7 @@ shots have in common, such as pictures of textures, are stored once (`gvpipe.con
     index = "uuid" box SHOTS_UUID: magic, [u16] version, [varint] bytes of the header, header, [u32] bytes of ftyp and moov,
             [u32] their CRC-32 without companions, [u32] CRC-32 of all before
     header = a JSON object in UTF-8, deflated (zlib): "fps", "id", "poster": bytes, "shots": "frames", "vertices", "triangles"
-             and "bytes" of each, "shared": bytes by hash, in order, "companions" (`gvpipe.container.companion`)
+             and "bytes" of each, "shared": bytes by hash, in order, "box", "companions" (`gvpipe.container.companion`)
     the shared sections lie in one "uuid" box DATA_UUID, if there are any; each shot in a "uuid" box SHOT_UUID
     id    = first 16 bytes, in hex, of the SHA-256 over the shared sections and the shots' files in order
 
@@ -56,6 +56,8 @@ MAX_SHOTS = 1 << 16
 MAX_HEADER = 1 << 22  # bytes, inflated
 MAX_BYTES = 1 << 40  # of a shot
 MAX_POSTER = 1 << 32
+MOTION = "box"  # key of the header
+FARTHEST = 1e39  # of a corner of the box, model units
 HEAD = struct.Struct("<II")
 
 
@@ -83,6 +85,8 @@ class ShotIndex:
         poster: offset and bytes.
         companions: tracks beside the video, of the whole film.
         lost: what is wrong with other companions, a line each.
+        box: smallest and largest x, y and z of frames, before coding, model units, relative to the first shot's origin, so that
+            a player has a view before it has decoded them; None: not known.
     """
 
     source: Source
@@ -97,6 +101,7 @@ class ShotIndex:
     poster: tuple[int, int]
     companions: tuple[Companion, ...] = ()
     lost: tuple[str, ...] = ()
+    box: tuple[float, ...] | None = None
 
     @property
     def size(self) -> int:
@@ -118,6 +123,7 @@ def pack_shots(
     shared: Mapping[str, bytes],
     fps: float,
     companions: Sequence[Companion] = (),
+    box: Sequence[float] | None = None,
 ) -> Iterator[bytes]:
     """Yield the bytes of a file, in order.
 
@@ -127,6 +133,7 @@ def pack_shots(
         shared: sections that the shots leave out, by hash.
         fps: frames per second.
         companions: tracks beside the video.
+        box: as of `ShotIndex`.
 
     Raises:
         InputError: companions would lie too far back for their tables.
@@ -149,6 +156,7 @@ def pack_shots(
             "bytes": [len(shot.data) for shot in shots],
         },
         "shared": {digest: len(data) for digest, data in shared.items()},
+        **({} if box is None else {MOTION: list(box)}),
         **describe(companions),
     }
     packed = zlib.compress(json.dumps(header, separators=(",", ":"), allow_nan=False).encode(), 9)
@@ -237,9 +245,12 @@ def read_shots(source: Source, box: Box, budget: Budget = UNLIMITED) -> ShotInde
     check_no_samples(moov)
     if f"{TAG_PREFIX}{VERSION} {header.text('id')}".encode("utf-8", "replace") not in moov:
         raise corrupt("its shots belong to another file")
+    corners = header.numbers(MOTION, 6, -FARTHEST, FARTHEST) if MOTION in header else None
+    if corners is not None and any(low > high for low, high in zip(corners[:3], corners[3:], strict=True)):
+        raise header.wrong(MOTION, "smallest before largest corners")
     found = detach_head(head, described, StoredSections(source, beside))
     index = ShotIndex(source, fps, frames, vertices, triangles, n_bytes, offsets, places, own_head, (poster_at, poster))
-    return replace(index, companions=found.companions, lost=found.lost)
+    return replace(index, companions=found.companions, lost=found.lost, box=corners)
 
 
 def _content(source: Source, at: int, uuid: UUID, length: int) -> int:

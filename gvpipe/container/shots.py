@@ -34,6 +34,7 @@ def write_shots(
     fps: float,
     parts: Mapping[int, SegmentParts] | None = None,
     companions: Sequence[Companion] = (),
+    box: Sequence[float] | None = None,
 ) -> WrittenShots:
     """Write a capture, all of it or nothing.
 
@@ -44,10 +45,34 @@ def write_shots(
         fps: the rate, frames per second.
         parts: of shots that are written in the stream layout, what each segment has; the others get the bare one.
         companions: tracks beside the video, of the whole film.
+        box: that the motion stays in, as of `ShotIndex`; None: that of the shots' first frames.
 
     Raises:
         OutputError: the file cannot be written; an older file of that name is left as it was.
     """
+    packed = pack_row(poster, shots, fps, parts, companions, box)
+    size = _write(path, packed.data)
+    return WrittenShots(size, packed.n_bytes, packed.sections)
+
+
+@dataclass(frozen=True)
+class PackedShots:
+    """The parts of a capture's file, bytes of each shot in it, and of its sections by name."""
+
+    data: Iterable[bytes]
+    n_bytes: list[int]
+    sections: dict[str, int]
+
+
+def pack_row(
+    poster: bytes,
+    shots: Sequence[Bitstream],
+    fps: float,
+    parts: Mapping[int, SegmentParts] | None = None,
+    companions: Sequence[Companion] = (),
+    box: Sequence[float] | None = None,
+) -> PackedShots:
+    """The file that `write_shots` would write."""
     parts = parts or {}
     hashes = [_hashes(shot) if number not in parts else {} for number, shot in enumerate(shots)]
     counts = Counter(digest for found in hashes for digest in set(found.values()))
@@ -65,8 +90,9 @@ def write_shots(
         files.append(ShotFile(data, shot.n_frames, shot.n_vertices, shot.n_triangles))
     for companion in companions:
         sections[companion.kind] += companion.n_bytes
-    size = _write(path, pack_shots(poster, files, shared, fps, companions))
-    return WrittenShots(size, [len(file.data) for file in files], {name: number for name, number in sections.items() if number})
+    packed = pack_shots(poster, files, shared, fps, companions, box or _box(shots))
+    n_bytes = [len(file.data) for file in files]
+    return PackedShots(packed, n_bytes, {name: number for name, number in sections.items() if number})
 
 
 def copy_shots(index: ShotIndex, path: str | os.PathLike[str], companions: Sequence[Companion]) -> int:
@@ -80,7 +106,7 @@ def copy_shots(index: ShotIndex, path: str | os.PathLike[str], companions: Seque
     columns = zip(index.frames, index.vertices, index.triangles, strict=True)
     files = [ShotFile(index.source.read(index.offsets[k], index.n_bytes[k]), *counts) for k, counts in enumerate(columns)]
     shared = {digest: index.find(digest) for digest in index.shared}
-    return _write(path, pack_shots(poster, files, shared, index.fps, companions))
+    return _write(path, pack_shots(poster, files, shared, index.fps, companions, index.box))
 
 
 def _write(path: str | os.PathLike[str], parts: Iterable[bytes]) -> int:
@@ -93,3 +119,15 @@ def _write(path: str | os.PathLike[str], parts: Iterable[bytes]) -> int:
 
 def _hashes(shot: Bitstream) -> dict[str, str]:
     return {name: section_hash(data) for name, data in shot.sections.items() if len(data) >= LEAST_SHARED}
+
+
+def _box(shots: Sequence[Bitstream]) -> list[float] | None:
+    """Smallest and largest corner of the shots' first frames, relative to the first's origin; None if a shot has no outline."""
+    first, corners = shots[0].origin, []
+    for shot in shots:
+        if shot.outline is None:
+            return None
+        shift = [own - other for own, other in zip(shot.origin, first, strict=True)] * 2
+        corners.append([float(value + by) for value, by in zip(shot.outline.box, shift, strict=True)])
+    low, high = (list(map(choose, zip(*corners, strict=True))) for choose in (min, max))
+    return low[:3] + high[3:]

@@ -12,7 +12,8 @@ from gvpipe.following.stages import Stage
 from gvpipe.following.surface import Samples, Surface, border_sides, unit, vertex_normals
 from gvpipe.foundation.arrays import Bool, Float64, Int32
 
-N_SAMPLES = 24_000  # of the frame's surface
+MOST_EMPHASIS = 16.0  # times that a distant pair counts
+LEAST_SAMPLES, MOST_SAMPLES = 4_000, 24_000  # of the frame's surface; between them, two for each triangle
 STILL = 1e-5  # part of the diagonal: a round that moves vertices less, root mean square, is the last one of its stage
 
 
@@ -21,12 +22,12 @@ class Goal:
 
     Args:
         surface: not empty.
-        n_samples: points of it that look for their places on the moved mesh.
+        most: points of it, at most, that look for their places on the moved mesh.
     """
 
-    def __init__(self, surface: Surface, n_samples: int = N_SAMPLES) -> None:
+    def __init__(self, surface: Surface, most: int = MOST_SAMPLES) -> None:
         self.surface = surface
-        samples = surface.sample(n_samples)
+        samples = surface.sample(min(max(LEAST_SAMPLES, 2 * len(surface.faces)), most))
         self.points = samples.of(surface.positions, surface.faces)
         self.normals = surface.closest.normals[samples.triangles]
 
@@ -103,7 +104,8 @@ class MovedMesh:
     def _weights(self, hits: Hits, counts: Bool, stage: Stage) -> Float64:
         """Weights ``(P,)`` of pairs: all together as many as there are vertices, if all count fully."""
         ratio = np.where(counts, hits.distances, 0.0) / (stage.scale * self._diagonal)
-        result: Float64 = counts / (1 + ratio**2) ** 2 * (self._n / len(counts))
+        more = np.minimum(1 + (ratio * (stage.scale / stage.emphasis)) ** 2, MOST_EMPHASIS)
+        result: Float64 = counts * more / (1 + ratio**2) ** 2 * (self._n / len(counts))
         return result
 
 

@@ -17,7 +17,7 @@ from gvpipe.foundation.progress import Progress, silent
 from gvpipe.runtime.blas import one_blas_thread
 
 MAX_ERROR = 0.01
-RMS = 0.0003
+RMS = 0.0004
 
 
 class MeshFrames(Protocol):

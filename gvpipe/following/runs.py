@@ -24,7 +24,7 @@ from gvpipe.following.surface import Moved, Surface
 from gvpipe.following.tracking import Track, is_within
 from gvpipe.foundation.arrays import Float64, Frames, Int32
 
-KEY_SHARE = 0.55  # of the rms that a followed frame may have: what a key's own may be
+KEY_SHARE = 0.45  # of the rms that a followed frame may have: what a key's own may be
 GIVEN_VERTICES = 1.5  # where the number of vertices is given, frames may have this many times the key's rms
 MOST_KEYS = 4  # that are tried for one run
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -19,6 +21,7 @@ class Stage:
         follows_borders: whether pairs may end at a border. If not, a hole of one surface does not pull the other's.
         flows: whether each round starts from the shape of the one before, as a viscous sheet does. If not, edges go back to
             their lengths at rest.
+        emphasis: distance from which a pair counts more, so that the largest errors shrink.
     """
 
     rounds: int
@@ -29,6 +32,7 @@ class Stage:
     hold: float = 0.1
     follows_borders: bool = False
     flows: bool = False
+    emphasis: float = np.inf
 
 
 MOTION = (
@@ -46,3 +50,6 @@ SURFACE = (
     Stage(3, 0.01, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
 )
 """The whole mesh, onto the surface: in the end all that is left of the distance counts, whatever the normals."""
+
+REPAIR = (Stage(4, 0.03, 0.05, -0.5, 0.08, hold=0.5, follows_borders=True, flows=True, emphasis=0.002),)
+"""Where some part is too far still: far pairs count most, whatever their normals."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 from gvpipe.following.cage import Cage
 from gvpipe.following.distance import SurfaceError, surface_error
 from gvpipe.following.fit import Goal, MovedMesh
-from gvpipe.following.stages import SURFACE
+from gvpipe.following.stages import REPAIR, SURFACE
 from gvpipe.following.surface import Moved, Surface
 from gvpipe.foundation.arrays import Float64
+
+HOPELESS = 3.0  # times the rms that is asked for: beyond it no repair is tried
 
 
 class Track:
@@ -35,11 +37,19 @@ class Track:
         moves = self._last - self._before
         for expected in [self._last + moves, self._last] if moves.any() else [self._last]:
             found = self._mesh.fit(self._cage.carry(expected, self._last, goal), self._last, goal, SURFACE)
-            error = surface_error(Moved(found, self._mesh.faces), surface, self._diagonal)
+            error = self._error(found, surface)
+            if not is_within(error, limit) and error.rms < HOPELESS * limit.rms:
+                found = self._mesh.fit(found, found, goal, REPAIR)
+                error = self._error(found, surface)
             if is_within(error, limit):
                 self._last, self._before = found, self._last
                 return found, error
+            if error.rms <= limit.rms:  # the motion was found; from elsewhere it would be found again
+                break
         return None
+
+    def _error(self, positions: Float64, surface: Surface) -> SurfaceError:
+        return surface_error(Moved(positions, self._mesh.faces), surface, self._diagonal)
 
 
 def is_within(error: SurfaceError, limit: SurfaceError) -> bool:

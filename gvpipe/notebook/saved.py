@@ -19,6 +19,10 @@ from gvpipe.web.page_view import PageView
 
 MOST_EMBEDDED = 4 << 20  # bytes of a file that a notebook holds unless it is told to
 LEFT_OUT = "the player is not in this notebook; run the cell"
+# JupyterLab says above it that there is no widget
+STYLE = """.jp-OutputArea-child:has(+ .jp-OutputArea-child [data-gvpipe="ID"]) .jupyter-widgets:not(:has(geometry-video)) {
+  display: none
+}"""
 SCRIPT = """(() => {
   const holder = document.querySelector('[data-gvpipe="ID"]');
   const button = holder.querySelector("button");
@@ -63,7 +67,9 @@ def saved_html(
     parts, words = [], [f"{prepared.name}: {describe(prepared.player.sequence())}"]
     if still is not None:
         text = base64.b64encode(still).decode("ascii")
-        parts.append(f'<img alt="first frame of {_safe(prepared.name)}" src="data:image/png;base64,{text}">')
+        parts.append(
+            f'<img style="display: block" alt="first frame of {_safe(prepared.name)}" src="data:image/png;base64,{text}">'
+        )
     if is_embedded(prepared, embed):
         page = page_text(prepared.name, prepared.data(), up, view)
         words.append(f"player and file, {show_bytes(len(page))} in this notebook; embed=False leaves them out")
@@ -72,7 +78,8 @@ def saved_html(
     else:
         words.append(LEFT_OUT)
     lines = "".join(f"<div>{_safe(each)}</div>" for each in words)
-    return f'<div data-gvpipe="{identifier}">{lines}{"".join(parts)}</div>'
+    style = f"<style>{STYLE.replace('ID', identifier)}</style>"
+    return f'<div data-gvpipe="{identifier}">{style}{lines}{"".join(parts)}</div>'
 
 
 def _safe(text: str) -> str:

@@ -4,6 +4,8 @@ What: page = ``page.html`` with the player's bundle (deflated, in digits of base
 opens from a disk. Why: browsers load no modules and fetch no files for a page that is itself a file. Base 85 takes a fifteenth
 less than base 64, which the element knows (``src="#id"``).
 
+Shots of a capture and several files are one row in the page, in one file that the player plays on one clock.
+
 A codec knows which of its files browsers play (`gvpipe.coding.registry.browser_obstacle`). Any other file, and one for which
 that is asked, is decoded and encoded anew at a Karni-Gotsman error that is small beside that of files. The error that this adds
 is measured and reported.
@@ -26,13 +28,16 @@ from gvpipe.coding.quality_scale import error_of, quality_of
 from gvpipe.coding.registry import browser_obstacle, make_codec
 from gvpipe.container.bitstream import BARE, STREAM, Bitstream
 from gvpipe.container.mp4 import file_bytes
+from gvpipe.container.shots import pack_row
 from gvpipe.container.sources import check_target, is_remote
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import InputError, OutputError
 from gvpipe.foundation.progress import Progress
+from gvpipe.playback.capture_player import CapturePlayer
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
+from gvpipe.rendering.field_range import Range
 from gvpipe.rendering.poster import poster_of
 from gvpipe.web.asset_export import carry_asset
 from gvpipe.web.page_view import PageView, page_view
@@ -42,14 +47,6 @@ AXES = ("y", "z")
 QUALITY = 90.0  # of a conversion: KG 0.044, which makes the error of a file of quality 75 (KG 0.14) 5 % larger
 MOST_ENCODES = 3
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~"  # no "<", which ends scripts
-NEXT = """let shown = 0; // what plays behind it: the next file, and the first behind the last
-const shows = document.querySelector("geometry-video");
-shows.addEventListener("ended", () => {
-  shown = (shown + 1) % count;
-  shows.addEventListener("ready", () => shows.play().catch(() => {}), { once: true });
-  shows.src = shown ? `#video${shown}` : "#video";
-});
-"""
 INSIDE = 0.97  # of the error allowed: aimed at after an encode that missed it
 
 
@@ -101,7 +98,7 @@ def export_html(
     unlimited: bool = False,
     then: Sequence[str | os.PathLike[str]] = (),
 ) -> ExportReport:
-    """Write a page of one file that plays a geometry video, or several, one after the other.
+    """Write a page of one file that plays a geometry video or a capture, or several, one after the other.
 
     Args:
         source: the geometry video, of any codec, or its address (``https://...``).
@@ -122,10 +119,10 @@ def export_html(
         camera: a view's name, ``"azimuth,elevation"`` or ``(azimuth, elevation)``, degrees, as of `gvpipe.render`.
         shading: ``"smooth"`` or ``"flat"``.
         unlimited: let the geometry video take whatever memory and work it asks for (`gvpipe.playback.player.Player`).
-        then: geometry videos that play behind the first, as pieces of a run whose topology changes. They are not converted.
+        then: geometry videos that play behind the first, at the same rate. Several, and captures, are not converted.
 
     Raises:
-        InputError: there is no such file or field, an argument cannot be used, or browsers do not play one of several files.
+        InputError: there is no such file or field, an argument cannot be used, or browsers do not play a shot of several.
         FormatError: not a geometry video, or a damaged one.
         OutputError: the page cannot be written; no part of it is left.
     """
@@ -137,30 +134,22 @@ def export_html(
         raise InputError(f"up is {up!r}; one of {', '.join(AXES)} is needed")
     if not os.path.isdir(target.parent):
         raise OutputError(f"cannot write {target}: no folder {target.parent}; create it first")
-    player = Player(source, unlimited=unlimited)
-    pieces = [Player(each, unlimited=unlimited) for each in then]
-    for piece in (player, *pieces) if pieces else ():
-        if convert or browser_obstacle(piece.bitstream):
-            raise InputError(f"{piece.path} is one of several, which are not converted; encode it for browsers (--for web)")
+    videos = [CapturePlayer(each, unlimited=unlimited) for each in (source, *then)]
+    shots = [shot for video in videos for shot in video.shots]
     if up is None:
-        up = player.metadata.up_axis if player.metadata.up_axis in AXES else "y"
-    view = page_view(
-        player.sequence(),
-        field=field,
-        colormap=colormap,
-        field_range=field_range,
-        log=log,
-        speed=speed,
-        warp=warp,
-        clip=clip,
-        camera=camera,
-        shading=shading,
-    )
-    view = replace(view, muted=any(each.sound is not None for each in (player, *pieces)))
+        found = shots[0].metadata.up_axis
+        up = found if found in AXES else "y"
+    options = {"colormap": colormap, "log": log, "speed": speed, "clip": clip, "camera": camera, "shading": shading}
+    view = _view_of(shots, field, field_range, warp, options)
+    view = replace(view, muted=any(video.sound is not None for video in videos))
+    if len(shots) > 1 or videos[0].index:
+        report = _write_page(videos[0].path, _row(videos, shots, convert), target, up, view)
+        return replace(report, unfinished=any(shot.bitstream.is_unfinished for shot in shots))
+    player = shots[0]
     obstacle = browser_obstacle(player.bitstream)
     if not obstacle and not convert:
-        report = _write_page(player.path, _as_it_is(player), target, up, view, [_as_it_is(piece) for piece in pieces])
-        return replace(report, unfinished=any(each.bitstream.is_unfinished for each in (player, *pieces)))
+        report = _write_page(player.path, _as_it_is(player), target, up, view)
+        return replace(report, unfinished=player.bitstream.is_unfinished)
     trial = _convert(player, QUALITY if quality is None else quality, progress)
     remaining = browser_obstacle(trial.bitstream)
     if remaining:
@@ -173,6 +162,42 @@ def export_html(
     return ExportReport(
         page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg
     )
+
+
+def _view_of(
+    shots: Sequence[Player], field: str | None, field_range: Range, warp: str | None, options: dict[str, Any]
+) -> PageView:
+    """How the page opens: what is asked of fields is looked up in the shots that have them, and colours span all of these."""
+    having = [shot for shot in shots if field in shot.fields] or list(shots[:1])
+    moving = next((shot for shot in shots if warp is not None and warp.partition(":")[0] in shot.fields), having[0])
+    warped = page_view(moving.sequence(), warp=warp).warp
+    views = [page_view(shot.sequence(), field=field, field_range=field_range, **options) for shot in having]
+    ends = [view.limits for view in views if view.limits is not None]
+    limits = (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+    return replace(views[0], limits=limits, warp=warped)
+
+
+def _row(videos: Sequence[CapturePlayer], shots: Sequence[Player], convert: bool) -> bytes:
+    """Several shots as the file of one capture."""
+    for shot in shots:
+        obstacle = browser_obstacle(shot.bitstream)
+        if convert or obstacle:
+            why = f" ({obstacle})" if obstacle else ""
+            raise InputError(f"{shot.path} is one of several, which are not converted{why}; encode it for browsers (--for web)")
+    for video in videos:
+        if video.fps != videos[0].fps:
+            rates = f"{videos[0].path} plays at {videos[0].fps:g} frames per second and {video.path} at {video.fps:g}"
+            raise InputError(f"{rates}; a page has one rate: encode them with the same --fps")
+    index = videos[0].index
+    if len(videos) == 1 and index is not None:
+        return index.source.read(0, index.size)
+    for video in videos:
+        if video.sound is not None:
+            raise InputError(
+                f"{video.path} has a sound, which a page of several files has no place for; take it out (--no-audio)"
+            )
+    bitstreams = [replace(shot.bitstream, outline=shot.bitstream.outline or shot.outline()) for shot in shots]
+    return b"".join(pack_row(poster_of(shots[0].sequence()), bitstreams, videos[0].fps).data)
 
 
 def _as_it_is(player: Player) -> bytes:
@@ -209,7 +234,7 @@ def _convert(player: Player, quality: float, progress: Progress | None) -> Trial
     return min(tried, key=lambda trial: trial.errors.kg or 0.0)
 
 
-def page_text(name: str, data: bytes, up: str, view: PageView, more: Sequence[bytes] = ()) -> str:
+def page_text(name: str, data: bytes, up: str, view: PageView) -> str:
     """A page that plays a geometry video.
 
     Args:
@@ -217,7 +242,6 @@ def page_text(name: str, data: bytes, up: str, view: PageView, more: Sequence[by
         data: of the file.
         up: the axis that stands upright in the first view.
         view: how it opens.
-        more: files that play behind it.
     """
     shipped = files("gvpipe.web")
     page = (shipped / "page.html").read_text("utf-8")
@@ -229,8 +253,6 @@ def page_text(name: str, data: bytes, up: str, view: PageView, more: Sequence[by
         "DIGITS": DIGITS,
         "PLAYER": _player(),
         "VIDEO": _base64(data),
-        "LOOP": "" if more else " loop",
-        "MORE": _behind(more) if more else "",
     }
     parts = page.split("$$")  # text, name, text, name, ..., text
     return "".join(values[part] if i % 2 else part for i, part in enumerate(parts))
@@ -242,19 +264,11 @@ def _player() -> str:
     return _base85(zlib.compress((files("gvpipe.web") / "bundle" / "player.js").read_bytes(), 9))
 
 
-def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView, more: Sequence[bytes] = ()) -> ExportReport:
-    text = page_text(name, data, up, view, more).encode()
+def _write_page(name: str, data: bytes, target: Path, up: str, view: PageView) -> ExportReport:
+    text = page_text(name, data, up, view).encode()
     with unnamed_path(target) as temporary:
         temporary.write_bytes(text)
-    return ExportReport(len(text), len(data) + sum(map(len, more)))
-
-
-def _behind(more: Sequence[bytes]) -> str:
-    """The elements of files that play behind the first, and what shows the next one where one has ended."""
-    held = "".join(
-        f'<script type="text/plain" id="video{number}">{_base64(data)}</script>\n' for number, data in enumerate(more, 1)
-    )
-    return f"{held}<script>\nconst count = {len(more) + 1};\n{NEXT}</script>\n"
+    return ExportReport(len(text), len(data))
 
 
 def _base64(data: bytes) -> str:

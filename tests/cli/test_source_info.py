@@ -86,7 +86,7 @@ def test_some_frames_where_the_topology_changes(run: Run, sequence: MeshSequence
     gvpipe.write(sequence.part(0, 2), tmp_path / "walk" / "%02d.obj")
     gvpipe.write(scene(3), tmp_path / "walk" / "%02d.obj", start=2)
     ended = run("render", tmp_path / "walk", tmp_path / "a.gif", "--size", 32)
-    assert ended.status == 1 and "--frames 0:2 or --frames 2:" in ended.err and ended.err.count("\n") == 1
+    assert ended.status == 0 and (tmp_path / "a.gif").is_file()  # a capture of two shots
     for span, frames, vertices in (("0:2", 2, 72), ("2:", 3, 98)):
         values = json.loads(run("info", tmp_path / "walk", "--frames", span, "--json").out)
         assert (values["frames"], values["vertices"]) == (frames, vertices)

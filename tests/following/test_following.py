@@ -15,7 +15,7 @@ from gvpipe.following.surface import Surface
 from gvpipe.foundation.arrays import Array, Float64, Int32
 from gvpipe.metrics.surface import surface_distances
 
-MAX_ERROR, RMS = 0.02, 0.004
+MAX_ERROR, RMS = 0.03, 0.006
 
 Mesh = tuple[Array, Array]
 
@@ -38,7 +38,7 @@ def ball(n: int, seed: int = 0) -> Mesh:
 
 def bent(t: float, seed: int) -> Mesh:
     """An ellipsoid that bends, moves and turns with time ``t``."""
-    points, faces = ball(900 + 10 * seed, seed)
+    points, faces = ball(400 + 10 * seed, seed)
     x, y, z = (points * [0.5, 1.5, 0.4]).T
     x = x + 0.3 * t * y**2
     angle = 0.3 * t
@@ -47,13 +47,13 @@ def bent(t: float, seed: int) -> Mesh:
 
 def two_balls(seed: int) -> Mesh:
     """Two spheres apart."""
-    points, faces = ball(500, seed)
+    points, faces = ball(200, seed)
     return np.concatenate([points, points + np.array([0, 3.0, 0])]), np.concatenate([faces, faces + len(points)])
 
 
 @pytest.fixture(scope="module")
 def moving() -> list[Mesh]:
-    return [bent(0.15 * k, k) for k in range(5)]
+    return [bent(0.15 * k, k) for k in range(4)]
 
 
 @pytest.fixture(scope="module")
@@ -79,20 +79,20 @@ def check(frames: Sequence[Mesh], runs: list[Run], largest: float, rms: float) -
 def test_one_mesh_follows_a_surface_that_bends(moving: list[Mesh], followed: list[Run]) -> None:
     check(moving, followed, MAX_ERROR, RMS)
     (run,) = followed
-    assert run.positions.shape[1] < 600  # of 900, and as few as the error allows
+    assert run.positions.shape[1] < 300  # of 400, and as few as the error allows
 
 
 def test_vertices_move_with_the_surface(followed: list[Run]) -> None:
     """A vertex goes where the motion takes it: what is followed slides little along the surface."""
     (run,) = followed
-    positions = run.positions[0:5]
+    positions = run.positions[0:4]
     edges = np.linalg.norm(positions[:, run.faces] - positions[:, np.roll(run.faces, 1, axis=1)], axis=3)
     assert np.abs(edges[-1] / edges[0] - 1).mean() < 0.15
 
 
 def test_runs_are_the_same_each_time(moving: list[Mesh], followed: list[Run]) -> None:
     (again,) = follow(moving, max_error=MAX_ERROR, rms=RMS)
-    np.testing.assert_array_equal(again.positions[0:5], followed[0].positions[0:5])
+    np.testing.assert_array_equal(again.positions[0:4], followed[0].positions[0:4])
     np.testing.assert_array_equal(again.faces, followed[0].faces)
 
 
@@ -145,7 +145,7 @@ def test_seams_are_welded(moving: list[Mesh]) -> None:
     """A triangle soup gives what its welded surface does."""
     soup = [(points[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)) for points, faces in moving[:2]]
     (run,) = follow(soup, max_error=MAX_ERROR, rms=RMS)
-    assert run.positions.shape[1] < 600
+    assert run.positions.shape[1] < 300
 
 
 def test_colours_come_from_the_frame(moving: list[Mesh], followed: list[Run]) -> None:

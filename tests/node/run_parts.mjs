@@ -6,6 +6,7 @@ import { pathToFileURL } from "node:url";
 import { StreamFile } from "../../gvpipe/web/src/format/stream_file.js";
 import { LevelChooser } from "../../gvpipe/web/src/level_chooser.js";
 import { Playback } from "../../gvpipe/web/src/playback.js";
+import { ShotRow } from "../../gvpipe/web/src/shots/shot_row.js";
 
 const { process } = globalThis;
 delete globalThis.process; // Draco's wrapper then takes this for a page
@@ -33,6 +34,56 @@ const commands = {
   async frame({ k }) {
     const frame = await video.frame(k);
     return { positions: [...frame], bounds: video.bounds };
+  },
+  /** Shots of a file on a server or on the disk, and frames in this order, with what is theirs. */
+  async shots({ url, path, frames }) {
+    video?.close();
+    video = await GeometryVideo.load(url ?? new Uint8Array(readFileSync(path)));
+    const found = [];
+    for (const k of frames) {
+      const positions = await video.frame(k);
+      found.push({ positions: [...positions], indices: [...video.indices], shot: video.shot, own: video.ownFrame(k) });
+    }
+    return { shots: video.shots, duration: video.duration, bounds: video.bounds, images: video.images.map(({ data }) => data.length), found };
+  },
+  /** What a row of shots opens and closes, `together` at once, while these frames are sought, or while it plays so many. */
+  async row({ shots, vertices, together, frames, plays }) {
+    const [opened, closed] = [[], []];
+    let [open, most] = [0, 0];
+    const load = async (number) => {
+      opened.push(number);
+      most = Math.max(most, ++open);
+      await new Promise((go) => setTimeout(go, 1));
+      open--;
+      const bounds = { min: [0, 0, 0], max: [1, 1, 1] };
+      const made = { indices: [0, 1, 2], basePoints: [], vertexCount: 1, bounds, frame: async (k) => Float32Array.of(number, k, 0) };
+      return { video: { ...made, close: () => closed.push(number) }, header: { frames: 2, vertices, triangles: 1, fps: 30 } };
+    };
+    const rows = Array.from({ length: shots }, (_, number) => ({ start: 2 * number, frames: 2, vertices, triangles: 1, bytes: 1 }));
+    const row = await ShotRow.open({ fps: 30, shots: rows, box: null, source: {} }, load, together, () => {});
+    const pictures = await row.openPictures();
+    const seen = [];
+    for (const k of frames) {
+      row.aim(k);
+      await pictures.seek(k);
+      row.shown = pictures.current.shot;
+      seen.push([...pictures.current.positions]);
+    }
+    if (plays) {
+      await new Promise((resolve, failed) => {
+        const show = (k) => {
+          row.shown = pictures.current.shot;
+          seen.push(k);
+          if (seen.length === plays) resolve();
+        };
+        pictures.play({ show, failed, ended: resolve, nextTick: clock(1000 / 30) }, 1, true);
+      });
+      pictures.pause();
+    }
+    const kept = pictures.kept.size;
+    row.close();
+    await null;
+    return { opened, closed, seen, most, kept };
   },
   async level({ level }) {
     await video.setLevel(level);

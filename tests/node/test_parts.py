@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import re
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import av
 import numpy as np
 import pytest
 from file_server import CHUNK, Served, serving
+from folders import SAMPLES
 from long_files import write_long
+from sequences import waving
 
 import gvpipe
 from gvpipe.container.mp4 import read_file
 from gvpipe.container.stream_layout import StoredSections
+from gvpipe.media.sound import Sound, pack_track
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node")
 VERTICES = [8000, 6000, 4000, 3000, 2000, 1000, 500]
@@ -211,3 +217,28 @@ def test_the_element_and_the_mesh_choose_while_they_play(node: Ask) -> None:
     assert node("follow", vertices=VERTICES, steps=steps)[:2] == [0, 0]  # waiting for the file is no reason
     found = node("follow", vertices=VERTICES, steps=steps)
     assert found[2] > 2 and found[3] < found[2]
+
+
+def test_a_long_sound_is_not_fetched(node: Ask, tmp_path: Path) -> None:
+    """Its tables exceed the first request; its samples are the browser's affair, and come late."""
+    path, sequence = tmp_path / "a.mp4", waving(6, 24)
+    tone = gvpipe.read_sound(SAMPLES / "voice.wav", "opus")
+    with av.open(io.BytesIO(tone.data), "r") as container:
+        stream = container.streams.audio[0]
+        packets = [bytes(packet) for packet in container.demux(stream) if packet.size]
+
+        def repeated() -> Iterator[av.Packet[Any]]:
+            for number in range(20_000):
+                packet = av.Packet(packets[1 + number % (len(packets) - 1)])
+                packet.pts, packet.duration, packet.time_base = 960 * number, 960, Fraction(1, 48_000)
+                yield packet
+
+        sound = Sound.of(pack_track(stream, repeated()))
+    gvpipe.encode(sequence, path, "pdct", segment=12, stream=True, audio=sound)
+    assert path.stat().st_size > sound.n_bytes > 1_000_000
+    with serving(path.read_bytes()) as (url, served):
+        for served.ranges in (True, False):
+            before = served.n_sent
+            assert node("load", url=url, level=0)["counts"][0] == 24
+            check(node("frame", k=20), gvpipe.open(path)[20])
+            assert not served.ranges or served.n_sent - before < 300_000

@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 from folders import DOCS
 from jupyter_lab import command, in_player, open_notebook, run_cell, write_notebook
-from pages import run
 from PIL import Image
 from sequences import waving
 
@@ -265,7 +264,15 @@ def test_the_picture_of_the_documentation(notebook: Any, folder: Path, request: 
     """A cell with the sample flag; ``--write-golden`` writes the picture that docs/notebooks.md shows."""
     shutil.copy(samples / "flag.npz", folder)
     _show(notebook, 'gvpipe.show("flag.npz", field="strain", colormap="viridis", autoplay=False)')
-    in_player(notebook, "await element.seek(20); element.closest('.jp-Cell').id = 'shown';")
+    notebook.set_window_size(1100, 1100)
+    in_player(
+        notebook,
+        """await element.seek(20);
+        const cell = element.closest(".jp-Cell");
+        cell.id = "shown";
+        cell.scrollIntoView();
+        await new Promise((resolve) => setTimeout(resolve, 500));""",
+    )
     shot = notebook.find_element("css selector", "#shown").screenshot_as_png
     picture = Image.open(io.BytesIO(shot)).convert("RGB")
     pixels = np.asarray(picture, int)
@@ -288,11 +295,10 @@ def test_a_notebook_that_was_saved_shows_and_plays_without_a_kernel(
     notebook.get((tmp_path / "saved.html").as_uri())
     _play_saved(notebook)
     notebook.get(f"{address}/lab/tree/saved.ipynb?reset")
-    run(
-        notebook,
-        "const until = async (f) => { while (!f()) await new Promise((r) => setTimeout(r, 50)); };"
-        "await until(() => document.querySelector('[data-gvpipe] img')?.naturalWidth > 0);",
-    )
+    in_player(notebook, "await until(() => document.querySelector('[data-gvpipe] img')?.naturalWidth > 0);")
+    in_player(notebook, "await until(() => document.querySelector('.jupyter-widgets')?.textContent.includes('not found'));")
+    assert in_player(notebook, "return getComputedStyle(document.querySelector('.jupyter-widgets')).display") == "none"
+    _play_saved(notebook)
 
 
 def _play_saved(browser: Any) -> None:

@@ -10,10 +10,9 @@ from typing import Any
 
 import browsers
 import numpy as np
-import numpy.typing as npt
 import pytest
 from folders import DOCS
-from pages import LOAD, encode_file, flipped, run
+from pages import LOAD, PAINTED, encode_file, flipped, run, silhouette
 from PIL import Image
 from sequences import waving
 
@@ -22,19 +21,6 @@ import gvpipe
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing())
 slow = pytest.mark.slow  # the default run has one test of exact positions and one of the player
 PLAYER_PAGE = (DOCS / "player.md").read_text("utf-8")
-Mask = npt.NDArray[np.bool_]
-PAINTED = "await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve, 50))));"
-
-
-def silhouette(points: npt.NDArray[np.float64], faces: npt.NDArray[np.int32], size: tuple[int, int]) -> Mask:
-    """Which pixels of a picture triangles cover, by the CPU renderer; ``points (V, 2)`` in pixels."""
-    width, height = size
-    flat = np.column_stack([points[:, 0], height - points[:, 1], np.zeros(len(points))]).astype(np.float32)
-    field = 28.0  # degrees; at this distance a unit is a pixel
-    distance = height / 2 / np.tan(np.radians(field) / 2)
-    camera = gvpipe.Camera((width / 2, height / 2, 0.0), distance, azimuth=0.0, elevation=0.0, field_of_view=field)
-    mask: Mask = gvpipe.Renderer(faces, flat, size, samples=1).visible(flat, camera) >= 0
-    return mask
 
 
 @slow
@@ -258,3 +244,76 @@ def test_the_element_as_the_docs_show_it(browser: Any, site: tuple[Path, str]) -
         await new Promise((resolve) => element.addEventListener("frame", () => !element.paused && resolve()));
         return element.video.frameCount;"""
     assert run(browser, played) == 24
+
+
+@slow
+def test_a_function_gives_the_file(player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    """Of a file in the stream layout it is asked for parts; its errors are the element's; a silent one is waited for."""
+    gvpipe.encode(waving(20, 60), site[0] / "plain-of-source.mp4", "pca", segment=10)
+    gvpipe.restream(site[0] / "plain-of-source.mp4", site[0] / "of-source.mp4", "stream")
+    for name in ("plain-of-source.mp4", "of-source.mp4"):
+        data = (site[0] / name).read_bytes()
+        asked, frames, size, message = player(
+            """const file = new Uint8Array(await (await fetch(args[0])).arrayBuffer());
+            const asked = [];
+            const source = {
+              name: "a <file>",
+              async fetchRange(start, stop) {
+                asked.push([start, Math.min(stop, file.length)]);
+                await new Promise((resolve) => setTimeout(resolve, 20));
+                return { data: file.slice(start, stop), size: file.length };
+              },
+            };
+            await element.load(source);
+            await element.seek(33);
+            const state = [asked, element.video.frameCount, element.video.byteLength];
+            element.remove();
+            await new Promise((resolve) => setTimeout(resolve, 50));
+            document.body.append(element); // it loads the same again
+            await new Promise((resolve) => element.addEventListener("ready", resolve, { once: true }));
+            const failing = { name: "b", fetchRange: () => Promise.reject(new Error("the kernel is gone")) };
+            await element.load(failing);
+            return [...state, element.error.message]""",
+            name,
+        )
+        assert (frames, size) == (60, len(data)) and message == "b cannot be fetched: the kernel is gone; try again"
+        assert asked[0] == [0, min(65536, len(data))] and all(0 <= start <= stop <= len(data) for start, stop in asked)
+
+
+@slow
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_views_and_parts_that_a_user_chooses_are_told(up: str, player: Callable[..., Any], site: tuple[Path, str]) -> None:
+    sheet = waving(8, 6)
+    half = len(sheet.faces) // 2
+    parts = tuple(
+        gvpipe.Part(name, (0, sheet.n_vertices), ends) for name, ends in (("a", (0, half)), ("b", (half, len(sheet.faces))))
+    )
+    gvpipe.encode(gvpipe.MeshSequence(sheet[:], sheet.faces, parts=parts), site[0] / "parted.mp4", "pca")
+    told = player(
+        f"""element.setAttribute("up", args[1]);
+        element.setAttribute("camera", "40,-20");
+        {LOAD}
+        const told = [element.view.map(Math.round)];
+        element.addEventListener("viewchange", ({{ detail }}) => told.push(detail.map(Math.round)));
+        element.addEventListener("partschange", ({{ detail }}) => told.push(detail));
+        element.turnTo(-100, 60);
+        told.push(element.view.map(Math.round));
+        const canvas = element.shadowRoot.querySelector("canvas");
+        const shift = {{ shiftKey: true, bubbles: true, composed: true }};
+        canvas.dispatchEvent(new KeyboardEvent("keydown", {{ key: "ArrowUp", ...shift }}));
+        element.hide(["b"]);
+        element.shadowRoot.querySelectorAll("li input")[0].click();
+        return told""",
+        "parted.mp4",
+        up,
+    )
+    assert told[:3] == [[40, -20], [-100, 60], [-100, 60]]
+    assert told[3] in ([-100, 70], [-100, 50]) and told[4:] == [["b", "a"]]
+
+
+def test_the_module_may_be_loaded_twice(player: Callable[..., Any]) -> None:
+    """As by several widgets of a notebook."""
+    assert (
+        player("""const { GeometryVideo } = await import("./player.js?again"); return typeof GeometryVideo.load""")
+        == "function"
+    )

@@ -33,7 +33,10 @@ TOOLS = """const element = document.querySelector("geometry-video");
     const moved = async () => { while (element.currentFrame < 4) await wait(20); };
     const look = async (ms) => {
       const found = [];
-      for (const end = performance.now() + ms; performance.now() < end; await wait(50)) found.push(off());
+      const note = () => found.push(off()); // when a frame is shown: a busy machine shows few
+      element.addEventListener("frame", note);
+      for (const end = performance.now() + ms; performance.now() < end || !found.length; ) await wait(50);
+      element.removeEventListener("frame", note);
       return found;
     };"""
 
@@ -43,7 +46,7 @@ def driver(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     if missing := browsers.missing(request.param):
         pytest.skip(missing)
     profile = tmp_path_factory.mktemp("profile")
-    server: AbstractContextManager[Any] = nullcontext({})
+    server: AbstractContextManager[dict[str, str]] = nullcontext({})
     if request.param == "firefox":
         server = browsers.sound_server(tmp_path_factory.mktemp("sound"))
     with server as more, browsers.browser(request.param, profile, more=more) as running:
@@ -195,11 +198,12 @@ def test_muting(driver: Any, player: Callable[..., Any], site: tuple[Path, str],
     click(driver)
     muted, playing, volume, off, error = player(
         """await wait(700);
-        return [element.muted, !sound().paused, sound().volume, off(), sound().error?.message ?? ""];"""
+        const playing = !sound().paused;
+        return [element.muted, playing, sound().volume, playing ? await look(300) : [], sound().error?.message ?? ""];"""
     )
     if not playing and error:
         pytest.skip(f"this machine has nothing that plays sound ({error})")
-    assert (muted, playing, volume) == (False, True, 0.5) and abs(off) < 3
+    assert (muted, playing, volume) == (False, True, 0.5) and max(map(abs, off)) < 3, off
 
 
 def test_browsers_that_refuse_are_obeyed(driver: Any, player: Callable[..., Any], site: tuple[Path, str], tone: Path) -> None:

@@ -250,3 +250,40 @@ def test_what_cannot_be_loaded(page: Run, folder: Path) -> None:
     assert found[0] == [[True, "load"], [True, "not-geometry-video"]]
     assert found[1] == ["./nothing.mp4", "./text.mp4"]
     assert found[2:] == ["NotSupportedError", "delta is undefined; a number of seconds is needed", True, "AbortError"]
+
+
+def test_a_capture_is_one_mesh(page: Run, folder: Path) -> None:
+    """Its geometry is that of the shot; the GPU keeps no other, and bounds hold the whole."""
+    shots = [waving(side, 5) for side in (6, 9, 5, 8)]
+    gvpipe.encode(gvpipe.Capture(shots, "four"), folder / "four.mp4", "pca")
+    found = page(
+        """const mesh = await load("four.mp4");
+        const scene = new THREE.Scene().add(mesh);
+        const renderer = new THREE.WebGLRenderer();
+        const camera = new THREE.PerspectiveCamera();
+        const changes = [];
+        mesh.addEventListener("shotchange", ({ shot }) => changes.push(shot));
+        const seen = [];
+        for (const k of [...Array(20).keys(), 0, 12]) {
+          await mesh.seek(k);
+          renderer.render(scene, camera);
+          seen.push([k, mesh.video.shot, mesh.geometry.attributes.position.count, array(mesh, "position")]);
+        }
+        const { geometries, textures } = renderer.info.memory;
+        mesh.loop = true;
+        await mesh.play();
+        await pass(mesh, 1.2);
+        const { min, max } = mesh.bounds;
+        const result = [mesh.duration, changes.slice(0, 5), seen, geometries, textures, min, max];
+        mesh.dispose();
+        renderer.dispose();
+        return [...result, changes.length];"""
+    )
+    duration, changes, seen, geometries, textures, low, high, n_changes = found
+    assert duration == 20 / 24 and changes == [1, 2, 3, 0, 2] and n_changes > 5
+    assert (geometries, textures) == (1, 0)
+    with gvpipe.open_capture(folder / "four.mp4") as video:
+        for k, shot, count, positions in seen:
+            assert shot == k // 5 and count == len(video[k])
+            assert np.array_equal(pages.points(positions), video[k])
+            assert (video[k] >= np.float32(low)).all() and (video[k] <= np.float32(high)).all()

@@ -13,6 +13,8 @@ import { kernelCode } from "./wasm/inflated.js";
 const BYTES_PER_VERTEX = 12; // of a frame
 const BYTES_PER_FRAME = 160; // that a clock keeps
 
+let canRun = null; // whether the browser runs the kernels, once that was asked
+
 /**
  * @typedef {object} Playable
  * @property {Uint32Array} faces (T, 3) flat @property {Int32Array} basePoints (V, 3) flat: equal rows are one point of the surface
@@ -26,10 +28,12 @@ const BYTES_PER_FRAME = 160; // that a clock keeps
  * @param {Uint8Array|import("./format/stream_file.js").StreamFile} source the file, or its parts
  * @param {import("./format/payload.js").Payload} payload
  * @param {import("./format/repeated_frames.js").RepeatedFrames} repeated @param {number|"coarsest"} level of detail @param {AbortSignal} signal closes it
+ * @param {{worker?: import("./frames/decoding_worker.js").DecodingWorker, keptBytes?: number}} [shared] of a shot: the worker of all, and
+ *   bytes of decoded frames that it may keep
  * @returns {Promise<Playable>}
  * @throws {GeometryVideoError} it is damaged, or this player or browser cannot read it
  */
-export async function openCodec(source, payload, repeated, level, signal) {
+export async function openCodec(source, payload, repeated, level, signal, shared = {}) {
   const { codec, version } = payload.header;
   const newest = readableVersion(codec);
   if (!newest) throw new GeometryVideoError("unsupported", `it was coded by ${quote(codec)}; gvpipe export-html converts it`);
@@ -38,19 +42,21 @@ export async function openCodec(source, payload, repeated, level, signal) {
     throw new GeometryVideoError("newer", `${found}, this player has ${newest}; a newer player is needed`);
   }
   const code = await kernelCode();
-  if (!WebAssembly.validate(code)) {
+  canRun ??= WebAssembly.validate(code);
+  if (!canRun) {
     throw new GeometryVideoError("unsupported", "this browser has no WebAssembly with SIMD; a newer one is needed");
   }
   const distinct = repeated.distinctPayload(payload);
   const sections = source instanceof Uint8Array ? distinct : new PartPayload(distinct, source);
   const hasTrajectories = codec === MCGV && "transform" in payload.header.settings;
-  return openFrames(code, source, hasTrajectories ? withPictures(source, sections) : sections, repeated, level, signal);
+  return openFrames(code, source, hasTrajectories ? withPictures(source, sections) : sections, repeated, { level, signal, ...shared });
 }
 
-async function openFrames(code, source, payload, repeated, level, signal) {
+async function openFrames(code, source, payload, repeated, { level, signal, worker, keptBytes }) {
   const { fps, container } = payload.header;
-  const host = new FrameHost(payload, code);
+  const host = new FrameHost(payload, code, worker);
   const close = () => {
+    signal.removeEventListener("abort", close);
     host.close();
     payload.close?.();
   };
@@ -67,7 +73,7 @@ async function openFrames(code, source, payload, repeated, level, signal) {
   const openClock = (planes, size, own, frame) => {
     const decoder = new FrameSource(host, own);
     if (!planes) have(repeated.distinct);
-    if (!planes) return DecodedPictures.of(frames, size, fps, repeated, decoder, { frame });
+    if (!planes) return DecodedPictures.of(frames, size, fps, repeated, decoder, { frame, keptBytes });
     const finish = (picture, levels) => decoder.finish(picture, levels);
     if (source instanceof Uint8Array) return openPictures(source, fps, repeated, planes, { checksum: container.track_crc32, finish });
     return DecodedPictures.inParts(source, fps, repeated, planes, { prepare: (picture) => host.prepare(picture), finish });

@@ -57,11 +57,12 @@ export class DecodedPictures {
    * @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {{decode: (group: object[], give: (picture: number, shown: object) => void) => Promise<void>, close: () => void,
    *   isConcurrent?: boolean}} decoder `isConcurrent`: it takes a group while it decodes others
-   * @param {{frame?: number, finish?: Finish|null}} [options] `frame` is shown first
+   * @param {{frame?: number, finish?: Finish|null, keptBytes?: number, mostAhead?: (group: number) => number}} [options] `frame` is shown
+   *   first; groups are kept up to so many bytes, and so many are decoded ahead of one, at most
    * @returns {Promise<DecodedPictures>}
    */
-  static async of(groups, groupBytes, fps, repeated, decoder, { frame = 0, finish = null } = {}) {
-    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, decoder, finish);
+  static async of(groups, groupBytes, fps, repeated, decoder, { frame = 0, finish = null, ...limits } = {}) {
+    const pictures = new DecodedPictures(groups, groupBytes, fps, repeated, decoder, finish, limits);
     try {
       await pictures.seek(frame);
     } catch (error) {
@@ -95,7 +96,9 @@ export class DecodedPictures {
     return DecodedPictures.of(groups, groupBytes, fps, repeated, { decode, close: () => inner.close() }, { finish });
   }
 
-  constructor(groups, groupBytes, fps, repeated, decoder, finish) {
+  constructor(groups, groupBytes, fps, repeated, decoder, finish, { keptBytes = KEPT_BYTES, mostAhead = () => Infinity } = {}) {
+    this.keptBytes = keptBytes;
+    this.mostAhead = mostAhead;
     this.fps = fps;
     this.repeated = repeated;
     /** The frame shown. */
@@ -235,10 +238,15 @@ export class DecodedPictures {
     this.finished.clear();
   }
 
+  /** Let go of groups `first` to `stop` that are decoded. */
+  forget(first, stop) {
+    for (const [group, { isDone }] of this.kept) if (isDone && group >= first && group < stop) this.kept.delete(group);
+  }
+
   /** Have the groups decoded that follow one: the next, and more up to so many pictures and half of what is kept. */
   #decodeAhead(group, pictures) {
     if (this.failure) return;
-    const most = Math.min(this.samples.length - 1, KEPT_BYTES / 2 / this.groupBytes);
+    const most = Math.min(this.samples.length - 1, this.keptBytes / 2 / this.groupBytes, this.mostAhead(group));
     for (let i = 1, ahead = 0; i === 1 || (i <= most && ahead < pictures); i++) {
       if (this.repeated.clip && group + i >= this.samples.length) break; // more will come
       const next = (group + i) % this.samples.length;
@@ -312,7 +320,7 @@ export class DecodedPictures {
     }
     this.kept.set(number, group);
     for (const [old, { isDone }] of this.kept) {
-      if (this.kept.size <= KEPT_GROUPS || this.kept.size * this.groupBytes <= KEPT_BYTES) break;
+      if (this.kept.size <= KEPT_GROUPS || this.kept.size * this.groupBytes <= this.keptBytes) break;
       if (isDone) this.kept.delete(old);
     }
     return group;

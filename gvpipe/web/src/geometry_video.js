@@ -8,17 +8,22 @@
 
 import { NO_ASSET, readAsset, readCoarseAsset } from "./asset/asset.js";
 import { openCodec } from "./codecs.js";
-import { readContainer } from "./format/boxes.js";
+import { findIndex, readContainer } from "./format/boxes.js";
 import { placesInFile, readCompanions } from "./format/companion_parts.js";
 import { describedIn, describedSound, geometryOf, soundOf } from "./format/companions.js";
 import { GeometryVideoError } from "./format/errors.js";
-import { readRepeatedFrames } from "./format/repeated_frames.js";
+import { RepeatedFrames, readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
 import { isRangeSource } from "./format/range_source.js";
+import { Bytes } from "./format/ranges.js";
 import { OUTAGE, closed, request } from "./format/request.js";
+import { readShots } from "./format/shot_layout.js";
 import { StreamFile } from "./format/stream_file.js";
+import { DecodingWorker } from "./frames/decoding_worker.js";
 import { MovingImages } from "./moving/moving_images.js";
 import { checkRate } from "./playback_rate.js";
+import { ShotRow } from "./shots/shot_row.js";
+import { kernelCode } from "./wasm/inflated.js";
 
 export { GeometryVideoError };
 
@@ -29,7 +34,10 @@ const LATEST = 1000; // while clips come
 const IDLE = 5000; // while none does
 const TRIES = 5; // of a look that the server refuses
 const PATIENCE = 30_000; // ms, with an outage
+const SOUND_IN_PARTS = "its sound is left out, since the file comes in parts from no address; load the whole file to hear it";
 const DAMAGED_SOUND = "its sound is damaged, and is left out; get the file again from its source";
+const [LEAST_WORKERS, MOST_WORKERS] = [2, 4]; // that decode shots: one frame of a mesh of its own takes much longer than one of many
+const SHOT_BYTES = 1 << 22; // of decoded frames that a shot keeps, beside those that its capture keeps
 const FROM_DISK = "pages opened from a disk may not fetch; open it from a web server, or make a page with gvpipe export-html";
 
 export class GeometryVideo {
@@ -59,16 +67,32 @@ export class GeometryVideo {
   }
 
   static async #load(source, level, closing) {
-    const parts = await openParts(source, closing.signal);
-    const file = parts instanceof StreamFile ? null : (parts ?? (await fetchBytes(source, closing.signal)));
+    const found = await openSource(source, closing.signal);
+    const index = found instanceof Uint8Array ? await shotsOf(found) : found instanceof StreamFile ? null : found;
+    const isInParts = !(found instanceof Uint8Array);
+    if (!index) return GeometryVideo.#open(found, level, closing, { address: source });
+    const video = await GeometryVideo.#openCapture(index, isInParts, level, closing);
+    video.#findSound(isInParts ? null : found, source, { container: index });
+    video.notes = [...video.notes, ...video.#soundNotes];
+    return video;
+  }
+
+  /**
+   * @param {Uint8Array|StreamFile} source of one connectivity
+   * @param {{find?: (hash: string) => Promise<Uint8Array|null>, worker?: DecodingWorker, keptBytes?: number, address?: unknown}} [shared]
+   *   of a shot; `address`: of the whole file
+   */
+  static async #open(source, level, closing, { find, address, ...shared } = {}) {
+    const parts = source instanceof StreamFile ? source : null;
+    const file = parts ? null : source;
     let [pictures, reader] = [null, null];
     try {
       closing.signal.throwIfAborted();
-      const payload = await readPayload(file ? readContainer(file) : parts.container);
+      const payload = await readPayload(file ? readContainer(file) : parts.container, find);
       const repeated = readRepeatedFrames(payload);
       const described = describedIn(payload.header);
       const companions = file ? companionsOf(file, described) : parts.companions(described);
-      reader = await openCodec(file ? geometryOf(file) : parts, payload, repeated, level, closing.signal);
+      reader = await openCodec(file ? geometryOf(file) : source, payload, repeated, level, closing.signal, shared);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
       closing.signal.throwIfAborted();
@@ -80,25 +104,70 @@ export class GeometryVideo {
       video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
       video.#companions = companions;
-      video.#findSound(file, source);
+      if (!find) video.#findSound(file, address, payload.header);
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       if (parts?.isGrowing) video.#watch(parts);
       return video;
     } catch (error) {
       pictures?.close();
       reader?.close();
-      parts?.close?.();
-      closing.signal.throwIfAborted();
-      closing.abort(closed());
-      if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
-      throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
+      parts?.close();
+      GeometryVideo.#giveUp(error, closing);
     }
+    return undefined;
+  }
+
+  static async #openCapture(index, isInParts, level, closing) {
+    const code = await kernelCode();
+    const count = Math.min(index.shots.length, MOST_WORKERS, Math.max(LEAST_WORKERS, (globalThis.navigator?.hardwareConcurrency ?? 1) - 1));
+    const workers = Array.from({ length: count }, () => new DecodingWorker(code, true));
+    const load = async (number) => {
+      const own = new AbortController();
+      const shared = { find: index.find, worker: workers[number % count], keptBytes: SHOT_BYTES };
+      const video = await GeometryVideo.#open(await StreamFile.openShot(index.shot(number)), 0, own, shared);
+      return { video, header: video.#payload.header };
+    };
+    const end = () => {
+      for (const worker of workers) worker.close();
+      index.source.close();
+    };
+    let row = null;
+    try {
+      closing.signal.throwIfAborted();
+      row = await ShotRow.open(index, load, 2 * count, end);
+      await row.at(level);
+      const pictures = await row.openPictures();
+      closing.signal.throwIfAborted();
+      const { start, frames } = index.shots.at(-1);
+      const repeated = new RepeatedFrames(start + frames);
+      const video = new GeometryVideo({ frames: start + frames, fps: index.fps, origin: row.origin }, index.size, repeated, row, pictures);
+      video.#row = row;
+      video.#isInParts = isInParts;
+      video.#closeFile = () => closing.abort(closed());
+      video.#takeShot();
+      return video;
+    } catch (error) {
+      if (row) row.close();
+      else end();
+      GeometryVideo.#giveUp(error, closing);
+    }
+    return undefined;
+  }
+
+  /** Throw what says best why a file cannot be opened. */
+  static #giveUp(error, closing) {
+    closing.signal.throwIfAborted();
+    closing.abort(closed());
+    if (!(error instanceof RangeError)) throw error; // an array that the browser cannot give
+    throw new GeometryVideoError("unsupported", "it needs more memory than this browser has for a page");
   }
 
   #payload;
   #companions = []; // tracks beside the geometry's
   #moving = null; // MovingImages, once they are asked for
   #opening = null; // a promise of them
+  #row = null; // ShotRow, of a capture
+  #isOfShot = false; // whether a shot was taken
   #repeated;
   #reader;
   #pictures;
@@ -119,6 +188,8 @@ export class GeometryVideo {
 
   /** The frame that is shown first: 0; of a file that is still written, that where its latest clip begins. */
   startFrame = 0;
+  /** The number of the shot that is shown: of the frame that was given last. `vertexCount`, `indices` and what lies beside positions are its own. */
+  shot = 0;
   /**
    * What is heard with it, or null: `{codec, channels, rate, seconds, start}`, of seconds after frame 0, and `url` of a file that
    * browsers play.
@@ -130,13 +201,18 @@ export class GeometryVideo {
   lost = () => {};
 
   /**
-   * Hear of both, beside those two functions.
+   * Hear of both, beside those two functions; of a capture, have something `ready` before frames are shown (`ShotRow.prepare`).
    *
-   * @param {{grown: () => void, lost: (error: Error) => void}} follower @returns {() => void} what ends it
+   * @param {{grown: () => void, lost: (error: Error) => void, ready?: (video: GeometryVideo, shot: number, frame: number) => Promise<void>,
+   *   closed?: (shot: number) => void}} follower @returns {() => void} what ends it
    */
   follow(follower) {
     this.#followers.add(follower);
-    return () => this.#followers.delete(follower);
+    const unprepare = follower.ready && this.#row?.prepare(follower);
+    return () => {
+      this.#followers.delete(follower);
+      unprepare?.();
+    };
   }
 
   constructor(header, byteLength, repeated, reader, pictures) {
@@ -148,6 +224,22 @@ export class GeometryVideo {
     this.byteLength = byteLength;
     this.#repeated = repeated;
     this.#takeLevel(reader, pictures, NO_ASSET);
+  }
+
+  /** Runs of frames of one connectivity, in order: `{start, frames, vertices, triangles}`, `start` being the first frame. */
+  get shots() {
+    const { frameCount: frames, vertexCount: vertices, triangleCount: triangles } = this;
+    return this.#row ? this.#row.shots.map(({ bytes: _, ...shot }) => shot) : [{ start: 0, frames, vertices, triangles }];
+  }
+
+  /** The number of a frame's shot. @param {number} k */
+  shotOf(k) {
+    return this.#row ? this.#row.shotOf(k) : 0;
+  }
+
+  /** The number that a frame of the shot that is shown has in it: that of frames of fields. @param {number} k */
+  ownFrame(k) {
+    return this.#row ? k - this.#row.shots[this.shot].start : k;
   }
 
   /** `{min, max}`: the box that the motion stays in, model units. Of a file in segments without pictures: of those read so far. */
@@ -195,14 +287,15 @@ export class GeometryVideo {
     if (!Number.isInteger(k) || k < 0 || k >= this.frameCount) {
       return Promise.reject(new RangeError(`frame ${k}: there are ${this.frameCount}`));
     }
-    const size = 3 * this.vertexCount;
+    const size = 3 * this.#verticesOf(k);
     if (positions && !(positions[Symbol.toStringTag] === "Float32Array" && positions.length >= size)) {
       return Promise.reject(new RangeError(`positions: a Float32Array of ${size} numbers is needed`));
     }
     return this.#queued(async () => {
       this.pause();
+      this.#row?.aim(k);
       await Promise.all([this.#pictures.seek(k), this.#besideOf(k)]);
-      return this.#read(k, positions ?? new Float32Array(3 * this.vertexCount));
+      return this.#read(k, positions);
     });
   }
 
@@ -378,13 +471,16 @@ export class GeometryVideo {
   }
 
   /** What is heard: of a file in memory a file of its own, else the track of the file that the browser fetches. */
-  #findSound(file, source) {
-    const { header } = this.#payload;
+  #findSound(file, source, header) {
     const described = describedSound(header);
     if (!described) return;
     const data = file && soundOf(file, header);
     if (file && !data) {
       this.#soundNotes = [DAMAGED_SOUND];
+      return;
+    }
+    if (!file && isRangeSource(source)) {
+      this.#soundNotes = [SOUND_IN_PARTS];
       return;
     }
     let url = file ? null : String(addressOf(source));
@@ -437,14 +533,35 @@ export class GeometryVideo {
   async #start() {
     if (this.#isClosed) throw closed();
     const { show, rate, loop, ...on } = this.#playing;
-    const positions = new Float32Array(3 * this.vertexCount);
-    await this.#pictures.play({ ...on, show: (k) => show(this.#read(k, positions), k) }, rate, loop);
+    let positions = null; // as long as the shot needs it
+    const read = (k) => (positions = this.#read(k, positions?.length === 3 * this.#verticesOf(k) ? positions : null));
+    await this.#pictures.play({ ...on, show: (k) => show(read(k), k) }, rate, loop);
   }
 
-  #read(k, positions) {
+  #verticesOf(k) {
+    return this.#row ? this.#row.shots[this.shotOf(k)].vertices : this.vertexCount;
+  }
+
+  #read(k, given) {
     this.#shown = k;
-    positions.set(this.#pictures.current);
+    if (this.#row) this.#takeShot();
+    const positions = given ?? new Float32Array(3 * this.vertexCount);
+    positions.set(this.#row ? this.#pictures.current.positions : this.#pictures.current);
     return positions;
+  }
+
+  /** Be of the shot of the frame that the clock shows. */
+  #takeShot() {
+    const { shot, video } = this.#pictures.current;
+    if (shot === this.shot && this.#isOfShot) return;
+    this.#isOfShot = true;
+    this.shot = this.#row.shown = shot;
+    this.levels = [video.vertexCount];
+    this.vertexCount = video.vertexCount;
+    this.triangleCount = video.triangleCount;
+    this.indices = video.indices;
+    this.basePoints = video.basePoints;
+    this.#takeAsset(video);
   }
 }
 
@@ -462,11 +579,21 @@ function checkSource(source) {
   throw new TypeError(`the source is ${found}; an address, a Blob or bytes are needed`);
 }
 
-/** The file in parts, where it is on a web server and in the stream layout; else null, or all of it where it has come. */
-async function openParts(source, signal) {
-  if (isRangeSource(source)) return StreamFile.open(source, signal);
-  if (!(typeof source === "string" || source instanceof URL)) return null;
-  return /^https?:$/.test(addressOf(source).protocol) ? StreamFile.open(source, signal) : null;
+/**
+ * The file, where it is here or has to come as a whole; on a web server in parts: of the stream layout, or the index of a capture.
+ *
+ * @returns {Promise<Uint8Array|StreamFile|import("./format/shot_layout.js").ShotIndex>}
+ */
+async function openSource(source, signal) {
+  const isAddress = typeof source === "string" || source instanceof URL;
+  const isOnServer = isRangeSource(source) || (isAddress && /^https?:$/.test(addressOf(source).protocol));
+  return (isOnServer && (await StreamFile.open(source, signal))) || fetchBytes(source, signal);
+}
+
+/** The index of a capture that is here, null of another file. */
+async function shotsOf(file) {
+  const box = findIndex(file);
+  return box?.isOfShots ? readShots(new Bytes(file), file, box) : null;
 }
 
 async function fetchBytes(source, signal) {

@@ -158,12 +158,12 @@ export class Playback {
     if (this.#isClosed || !this.paused || this.#seeking) return; // what plays, or is sought, is of that level
     const k = this.currentFrame;
     const positions = await this.#video.frame(k);
-    if (!this.#isClosed && this.#isCurrent(positions)) this.#on.show(positions, k);
+    if (!this.#isClosed && this.#isCurrent(positions, k)) this.#on.show(positions, k);
   }
 
-  /** Whether positions are of the level that is shown: it may have changed since they were asked for. */
-  #isCurrent(positions) {
-    return positions.length === 3 * this.#video.vertexCount;
+  /** Whether positions are of the level and the shot that are shown: these may have changed since they were asked for. */
+  #isCurrent(positions, k) {
+    return positions.length === 3 * this.#video.vertexCount && this.#video.shotOf(k) === this.#video.shot;
   }
 
   /**
@@ -241,7 +241,7 @@ export class Playback {
         this.#wanted = null;
         const [positions] = await Promise.all([this.#video.frame(k), this.#on.prepare(k)]);
         if (this.#isClosed) return;
-        if (this.#isCurrent(positions)) this.#show(positions, k);
+        if (this.#isCurrent(positions, k)) this.#show(positions, k);
         else this.#wanted ??= k;
       }
     } catch (error) {

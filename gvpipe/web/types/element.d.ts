@@ -1,6 +1,6 @@
 /** The element `<geometry-video>`; to import this defines it. */
 
-import type { Cut, GeometryVideo, Picked, Source } from "./geometry-video.js";
+import type { Cut, GeometryVideo, Picked, Shot, Source } from "./geometry-video.js";
 
 export * from "./geometry-video.js";
 
@@ -15,6 +15,8 @@ export interface GeometryVideoElementEventMap extends Omit<HTMLElementEventMap, 
   partschange: CustomEvent<string[]>;
   /** The level of detail that is shown. */
   levelchange: CustomEvent<number>;
+  /** The number of the shot that is shown, of a capture. */
+  shotchange: CustomEvent<number>;
   /** The cut that is shown, or null. */
   clip: CustomEvent<Cut | null>;
   /** A point was clicked on. */
@@ -72,6 +74,10 @@ export class GeometryVideoElement extends HTMLElement {
 
   readonly video: GeometryVideo | null;
   readonly currentFrame: number;
+  /** Runs of frames of one connectivity; [] while nothing is loaded. */
+  readonly shots: Shot[];
+  /** The number of the shot that is shown. */
+  readonly shot: number;
   /** Shows frame k, and pauses; while a file loads, once it is there. Of many calls in a row the last counts. */
   seek(k: number): Promise<void>;
   readonly colormap: string;

@@ -214,6 +214,15 @@ export interface Image {
   readonly data: Uint8Array;
 }
 
+/** A run of frames of one connectivity. */
+export interface Shot {
+  /** The first frame. */
+  readonly start: number;
+  readonly frames: number;
+  readonly vertices: number;
+  readonly triangles: number;
+}
+
 export class GeometryVideo {
   private constructor();
   /**
@@ -228,6 +237,17 @@ export class GeometryVideo {
   readonly origin: [number, number, number];
   readonly vertexCount: number;
   readonly triangleCount: number;
+  /** In order; a file whose vertices and triangles never change has one. */
+  readonly shots: Shot[];
+  /**
+   * The number of the shot that is shown: of the frame that was given last. Numbers of vertices and triangles, `indices`, `basePoints`
+   * and what lies beside positions are its own.
+   */
+  readonly shot: number;
+  /** The number of a frame's shot. */
+  shotOf(k: number): number;
+  /** The number that a frame of the shot that is shown has in it, which is that of frames of its fields. */
+  ownFrame(k: number): number;
   /** Bytes of the file. */
   readonly byteLength: number;
   /** Seconds; `Infinity` while the file is still written. */
@@ -240,8 +260,16 @@ export class GeometryVideo {
   grown: () => void;
   /** Called when it cannot be followed any longer. */
   lost: (error: Error) => void;
-  /** Hear of both, beside those two functions; returns what ends it. */
-  follow(follower: { grown: () => void; lost: (error: Error) => void }): () => void;
+  /**
+   * Hear of both, beside those two functions; returns what ends it. Of a capture, `ready` is called before a frame is shown, with its
+   * shot and its number in it, and waited for; `closed` when a shot is let go of.
+   */
+  follow(follower: {
+    grown: () => void;
+    lost: (error: Error) => void;
+    ready?: (video: GeometryVideo, shot: number, frame: number) => Promise<unknown>;
+    closed?: (shot: number) => void;
+  }): () => void;
   /** Seconds that play without a wait for the file: `[start, end]` of each stretch. */
   readonly buffered: [number, number][];
   /** Bits per second. */

@@ -42,6 +42,8 @@ export interface GeometryVideoMeshEvents extends Object3DEventMap {
   frame: { frame: number };
   /** Another level of detail is shown; geometry and materials are new. */
   levelchange: { level: number };
+  /** Another shot of a capture is shown; geometry and materials are new. */
+  shotchange: { shot: number };
   /** Late values of a field, or textures, have come: the scene is to be drawn anew. */
   change: {};
   error: { error: Error };
@@ -106,6 +108,9 @@ export class GeometryVideoMesh extends MeshOfVideo {
   setClip(cut: Cut | null): Promise<boolean>;
   /** (n, 3, 3) corners of the triangles of that section, model units, the file's origin apart; empty where the cut is hollow. */
   readonly section: Float32Array;
+  /** Where the plane of the cut is, in the geometry's units: across axis 0, 1 or 2; `sign` 1 leaves out what lies above. Or null. */
+  readonly cut: { axis: number; place: number; sign: number } | null;
+  updateMatrixWorld(force?: boolean): void;
   /** The box that the motion stays in, displacements with it, model units. It may grow. */
   readonly bounds: { min: [number, number, number]; max: [number, number, number] };
   /** What of the frame shown a ray meets first, hidden parts apart, in the geometry's units; of a triangle, its nearest vertex. */
@@ -120,6 +125,8 @@ export class GeometryVideoMesh extends MeshOfVideo {
       scale?: "linear" | "log";
     },
   ): Promise<[number, number] | null>;
+  /** Values of the first and the last colour of the field that is shown. */
+  readonly fieldRange: [number, number];
   /** A mesh that shares geometry and materials, and so moves with this one. */
   clone(recursive?: boolean): Mesh;
   /** Frees the video, and what the GPU has of it. */

@@ -10,6 +10,7 @@ import {
   STREAM_LAYOUT_INDEX_UUID as INDEX_UUID,
   STREAM_LAYOUT_MAX_INDEX as MAX_INDEX,
   STREAM_LAYOUT_ROOM_UUID as ROOM_UUID,
+  STREAM_LAYOUT_SHOTS_UUID as SHOTS_UUID,
 } from "../constants.js";
 import { crc32 } from "./checksum.js";
 import { AGAIN, GeometryVideoError } from "./errors.js";
@@ -67,9 +68,9 @@ export function readTag(moov) {
 }
 
 /**
- * The content of the index, or of the room for it, of a file of which the start is here; null if it is not of the stream layout.
+ * The content of the index, or of the room for it, of a file of which the start is here; null if it has none in front.
  *
- * @param {Uint8Array} start of the file, not just of the index @returns {{start: number, end: number, isRoom: boolean}|null}
+ * @param {Uint8Array} start of the file, not just of the index @returns {{start: number, end: number, isRoom: boolean, isOfShots: boolean}|null}
  */
 export function findIndex(start) {
   const view = new DataView(start.buffer, start.byteOffset, start.byteLength);
@@ -80,13 +81,24 @@ export function findIndex(start) {
     const kind = String.fromCharCode(...start.subarray(position + 4, position + 8));
     if (kind !== wanted || size < 8) return null;
     const isOf = (uuid) => uuid.every((byte, i) => start[position + 8 + i] === byte);
-    const isRoom = isOf(ROOM_UUID);
-    if (kind === "uuid" && (isRoom || isOf(INDEX_UUID)) && size <= MAX_INDEX) {
-      return { start: position + 8 + INDEX_UUID.length, end: position + size, isRoom };
+    const [isRoom, isOfShots] = [isOf(ROOM_UUID), isOf(SHOTS_UUID)];
+    if (kind === "uuid" && (isRoom || isOfShots || isOf(INDEX_UUID)) && size <= MAX_INDEX) {
+      return { start: position + 8 + INDEX_UUID.length, end: position + size, isRoom, isOfShots };
     }
     position += size;
   }
   return null;
+}
+
+/** Where the head of the box behind `ftyp` and `moov` ends, of a file of which the start is here; 0 if it does not begin with these. */
+export function endOfHead(start) {
+  const view = new DataView(start.buffer, start.byteOffset, start.byteLength);
+  let position = 0;
+  for (const wanted of ["ftyp", "moov"]) {
+    if (position + 8 > start.length || String.fromCharCode(...start.subarray(position + 4, position + 8)) !== wanted) return 0;
+    position += view.getUint32(position);
+  }
+  return position + 8 + INDEX_UUID.length;
 }
 
 /** The error for a container that is not read here. */

@@ -8,8 +8,27 @@ const TOGETHER = 1 << 16; // bytes that go in at once, so that little comes out 
  * @param {(what: string) => Error} corrupt makes the error to throw
  * @returns {Promise<Uint8Array>}
  */
-export async function inflate(data, limit, corrupt) {
-  const reader = streamOf(data).pipeThrough(new DecompressionStream("deflate")).getReader();
+export function inflate(data, limit, corrupt) {
+  return inflated(data, "deflate", limit, corrupt);
+}
+
+/**
+ * The same of a stream without head and checksum, which was deflated with a dictionary. Browsers take none: the dictionary goes in
+ * as a stored block before it, and comes out again.
+ *
+ * @param {Uint8Array} dictionary of at most 65535 bytes
+ */
+export async function inflateRaw(data, dictionary, limit, corrupt) {
+  const { length } = dictionary;
+  const stored = Uint8Array.of(0, length & 255, length >> 8, ~length & 255, (~length >> 8) & 255, ...dictionary);
+  const whole = new Uint8Array(stored.length + data.length);
+  whole.set(stored);
+  whole.set(data, stored.length);
+  return (await inflated(whole, "deflate-raw", limit + length, corrupt)).subarray(length);
+}
+
+async function inflated(data, format, limit, corrupt) {
+  const reader = streamOf(data).pipeThrough(new DecompressionStream(format)).getReader();
   const parts = [];
   let size = 0;
   try {

@@ -2,7 +2,7 @@
 
 import { SEGMENTS_LARGEST_STEP as LARGEST_STEP, SEGMENTS_MAX_SEGMENT as MAX_SEGMENT, SEGMENTS_SMALLEST_STEP as SMALLEST_STEP } from "../constants.js";
 import { corrupt, quote } from "./errors.js";
-import { checkInteger, checkNumber } from "./payload.js";
+import { checkInteger, checkNumber } from "./header.js";
 
 /** How many segments there are, at most `most`. @param {object} header of the payload @param {number} most @param {string} [key] */
 export function readSegments({ settings, frames }, most, key = "segments") {

@@ -5,22 +5,22 @@
 
 import { readFragmentSamples } from "../fragments.js";
 import { readDescription, ranks } from "../track.js";
-import { findIndex, readTag } from "./boxes.js";
+import { STREAM_LAYOUT_MAX_INDEX as MAX_INDEX } from "../constants.js";
+import { endOfHead, findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
 import { readCompanions } from "./companion_parts.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
-import { Incoming } from "./incoming.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
-import { clipName, readHeader } from "./payload.js";
-import { joined, nameOf, request } from "./request.js";
+import { clipName, readHeader } from "./header.js";
+import { Ranges } from "./ranges.js";
+import { joined, nameOf } from "./request.js";
+import { readShots } from "./shot_layout.js";
 import { checkHead, OF_COMPANIONS, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
 const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas|clip)\.(\d+)$/;
 const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
-const PARTIAL = 206;
-const UNSATISFIABLE = 416;
 const FIRST_LIVE = 1 << 17; // bytes of the second request, of a file that is still written
 const ROWS = 64; // of the table of clips, asked for at once
 const LOOK_AGAIN = 500; // ms between looks for a first clip
@@ -29,50 +29,68 @@ const LOOKS = 120;
 export class StreamFile {
   /**
    * @param {string|URL|import("./range_source.js").RangeSource} url @param {AbortSignal} signal ends its requests
-   * @returns {Promise<StreamFile|Uint8Array|null>} the whole file where it has the plain layout, where nothing belongs to segments, and
-   *   of pictures where there is no WebCodecs; null where the server refuses a part
+   * @returns {Promise<StreamFile|import("./shot_layout.js").ShotIndex|Uint8Array|null>} the whole file where it has the plain layout, where
+   *   nothing belongs to segments, and of pictures where there is no WebCodecs; null where the server refuses a part
    * @throws {GeometryVideoError} it cannot be fetched, or the index is damaged
    */
   static async open(url, signal) {
-    const asked = await request(url, signal, { init: { headers: { Range: `bytes=0-${FIRST - 1}` } } });
-    const { response } = asked;
-    if (response.status === UNSATISFIABLE) return null; // an empty file
-    if (!response.ok) {
-      throw asked.refused();
-    }
-    const incoming = response.status === PARTIAL ? null : new Incoming(asked);
-    const start = incoming ? await incoming.read(0, FIRST) : await asked.bytes();
+    const opened = await Ranges.open(url, signal, FIRST);
+    if (!opened) return null;
+    const { ranges } = opened;
+    let { start } = opened;
     if (start.length < FIRST) return start;
-    const rest = (data) => incoming?.whole() ?? fetchRest(url, signal, data);
+    const head = endOfHead(start);
+    if (head > start.length && head <= MAX_INDEX && head <= (ranges.size || Infinity)) { // a long sound has long tables
+      start = joined([start, await ranges.read(start.length, head - start.length)]);
+    }
     const box = findIndex(start);
-    if (!box) return rest(start);
-    if (box.isRoom) return StreamFile.#openLive(url, signal, start.length, box.end, incoming);
-    const file = new StreamFile(url, signal, start.length, incoming);
-    file.total = totalOf(response);
+    if (!box) return ranges.rest(start);
+    if (box.isOfShots) return readShots(ranges, start, box);
+    if (box.isRoom) return StreamFile.#openLive(ranges, box.end);
+    return StreamFile.#openStream(ranges, start, box, () => ranges.rest(start));
+  }
+
+  /**
+   * A shot of a capture.
+   *
+   * @param {import("./ranges.js").Window} source of its bytes
+   * @returns {Promise<StreamFile|Uint8Array>} as `open` gives it
+   */
+  static async openShot(source) {
+    const start = await source.read(0, Math.min(FIRST, source.size));
+    const rest = async () => joined([start, await source.read(start.length, source.size - start.length)]);
+    if (start.length === source.size) return start;
+    const box = findIndex(start);
+    if (box?.isRoom || box?.isOfShots) throw corrupt("index", "a shot is neither of the bare nor of the stream layout");
+    return box ? StreamFile.#openStream(source, start, box, rest) : rest();
+  }
+
+  static async #openStream(source, start, box, rest) {
+    const file = new StreamFile(source);
+    file.start = start;
     const more = Math.max(0, box.end - start.length);
     const data = more ? joined([start, await file.#fetch(start.length, more)]) : start;
-    return (await file.#begin(data, box)) ? file : rest(data);
+    return (await file.#begin(data, box)) ? file : rest();
   }
 
   /** A file that is still written, once a clip is there. @param {number} place behind the room for the index */
-  static async #openLive(url, signal, received, place, incoming) {
-    incoming?.close();
-    if (incoming) throw new GeometryVideoError("load", `${nameOf(url)} is still written, and its server knows no Range; try again when it is finished`);
-    const file = new StreamFile(url, signal, received, null);
+  static async #openLive(ranges, place) {
+    const { url } = ranges;
+    if (!ranges.isPartial) {
+      ranges.close();
+      throw new GeometryVideoError("load", `${nameOf(url)} is still written, and its server knows no Range; try again when it is finished`);
+    }
+    const file = new StreamFile(ranges);
     for (let i = 0; i < LOOKS; i++) {
       if (await file.#beginLive(place)) return file;
       await new Promise((resolve) => setTimeout(resolve, LOOK_AGAIN));
     }
-    throw new GeometryVideoError("load", `${nameOf(url)} is still written, and nothing comes; try again`);
+    throw new GeometryVideoError("load", `${nameOf(ranges.url)} is still written, and nothing comes; try again`);
   }
 
-  constructor(url, signal, received, incoming) {
-    this.url = url;
-    this.signal = signal;
-    this.total = ""; // bytes of the whole file, as its server says at first
-    /** Bytes that have come so far. */
-    this.received = received;
-    this.incoming = incoming; // where the server knows no Range
+  /** @param {import("./ranges.js").Ranges|import("./ranges.js").Window} source of its bytes */
+  constructor(source) {
+    this.source = source;
     this.start = null; // bytes that came at first, until a segment is here
     this.head = null; // the boxes `ftyp` and `moov`, without companions
     this.wholeHead = null; // with them
@@ -87,9 +105,14 @@ export class StreamFile {
     this.live = null;
   }
 
+  /** Bytes that have come so far. */
+  get received() {
+    return this.source.received;
+  }
+
   /** Fetch nothing more. */
   close() {
-    this.incoming?.close();
+    this.source.close();
   }
 
   /** Names of all sections, here or not. */
@@ -146,7 +169,7 @@ export class StreamFile {
     const found = readRows(await this.#fetch(start, Math.min(ROW_BYTES * ROWS, tableEnd - start)));
     const [same, before] = [found.rows[0], rows.at(-1)];
     if (!same || ["length", "checksum", "frames"].some((field) => same[field] !== before[field])) {
-      throw this.#isAnother();
+      throw this.source.isAnother();
     }
     this.#addClips(found.rows.slice(1));
     this.live.hasEnded = found.hasEnded || start + ROW_BYTES >= tableEnd;
@@ -297,50 +320,11 @@ export class StreamFile {
   /** @param {boolean} [mayEnd] whether the file may end before */
   async #fetch(offset, length, mayEnd = false) {
     if (offset + length <= this.start?.length) return this.start.subarray(offset, offset + length);
-    const wanted = `bytes ${offset} to ${offset + length - 1} of ${nameOf(this.url)}`;
-    if (this.incoming) return this.#await(offset, length, wanted);
-    const init = { cache: this.live ? "no-store" : "default", headers: { Range: `bytes=${offset}-${offset + length - 1}` } };
-    const asked = await request(this.url, this.signal, { what: wanted, init, most: length });
-    const { response } = asked;
-    if (response.status !== PARTIAL) throw asked.refused(); // 200: the whole file would come
-    const data = await asked.bytes();
-    if (this.total && totalOf(response) && totalOf(response) !== this.total) throw this.#isAnother();
-    if (!mayEnd || data.length > length) checkLength(data, length, wanted);
-    this.received += data.length;
-    return data;
-  }
-
-  #isAnother() {
-    return new GeometryVideoError("corrupt", `${nameOf(this.url)} has another file by now; load the page again`);
-  }
-
-  async #await(offset, length, wanted) {
-    const data = await this.incoming.read(offset, length);
-    checkLength(data, length, wanted);
-    this.received = this.incoming.received;
-    return data;
+    return this.source.read(offset, length, { mayEnd, isFresh: this.live !== null });
   }
 }
 
 function checked(name, data, { checksum }) {
   if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
   return data;
-}
-
-function checkLength(data, length, wanted) {
-  if (data.length === length) return;
-  throw new GeometryVideoError("load", `${wanted} cannot be fetched: ${data.length} bytes came; load the page again`);
-}
-
-/** All of a file whose start is here; null if the server refuses. */
-async function fetchRest(url, signal, start) {
-  const asked = await request(url, signal, { init: { headers: { Range: `bytes=${start.length}-` } } });
-  if (asked.response.status === PARTIAL) return joined([start, await asked.bytes()]);
-  asked.close();
-  return null;
-}
-
-/** Bytes of the whole file, of an answer with a part; "" where the server does not say it, or not to other sites. */
-function totalOf(response) {
-  return /\/(\d+)$/.exec(response.headers.get("Content-Range") ?? "")?.[1] ?? "";
 }

@@ -3,19 +3,19 @@
  * none (as in Node). The worker asks for sections when it needs them.
  */
 
-import { dracoBinary } from "../format/draco.js";
 import { GeometryVideoError } from "../format/errors.js";
 import { closed } from "../format/request.js";
+import { DecodingWorker } from "./decoding_worker.js";
 import { FrameDecoder } from "./frame_decoder.js";
-import { workerAddress } from "./worker_address.js";
 
 export class FrameHost {
   #payload;
-  #worker = null;
+  #code;
+  #worker; // DecodingWorker, null where there is none
+  #file; // its number in the worker
   #decoder = null; // in place of a worker
   #jobs = new Map(); // number -> what is not answered yet
   #count = 0;
-  #setUp;
   #isClosed = false;
 
   /** `{min, max}`: the box of the motion, of the segments read so far; null: of none. */
@@ -24,19 +24,16 @@ export class FrameHost {
   /**
    * @param {import("../format/payload.js").Payload} payload of the distinct frames; `section` may return promises
    * @param {Uint8Array} code of kernels
+   * @param {DecodingWorker} [worker] that decodes other files, too; else it has one of its own
    */
-  constructor(payload, code) {
+  constructor(payload, code, worker = new DecodingWorker(code)) {
     this.#payload = payload;
+    this.#code = code;
+    this.#worker = worker;
     const { header, sections, budget } = payload;
-    this.#setUp = { task: "frames", header, isWhole: payload.isWhole, names: [...sections.keys()], bytes: budget.bytes, code, draco: dracoBinary };
-    try {
-      this.#worker = new Worker(workerAddress());
-      this.#worker.onmessage = ({ data }) => this.#take(data);
-      this.#worker.onerror = () => this.#goOnHere(); // pages may forbid workers
-      this.#worker.postMessage(this.#setUp);
-    } catch {
-      this.#goOnHere();
-    }
+    const open = { header, isWhole: payload.isWhole, names: [...sections.keys()], bytes: budget.bytes };
+    this.#file = worker.add({ take: (message) => this.#take(message), lost: () => this.#goOnHere() }, open);
+    if (this.#file === null) this.#goOnHere(); // pages may forbid workers
   }
 
   /** What `FrameDecoder.describe` gives. */
@@ -59,12 +56,12 @@ export class FrameHost {
   /** That the file has so many frames by now. */
   grow(frames) {
     const names = this.#payload.grow(frames);
-    this.#worker?.postMessage({ grown: { frames, names } });
+    this.#worker?.post(this.#file, { grown: { frames, names } });
   }
 
   close() {
     this.#isClosed = true;
-    this.#worker?.terminate();
+    this.#worker?.remove(this.#file);
     for (const { reject } of this.#jobs.values()) reject(closed());
     this.#jobs.clear();
   }
@@ -75,7 +72,7 @@ export class FrameHost {
     return new Promise((resolve, reject) => {
       const number = this.#count++;
       this.#jobs.set(number, { job, resolve, reject });
-      this.#worker.postMessage({ number, ...job });
+      this.#worker.post(this.#file, { number, ...job });
     });
   }
 
@@ -85,9 +82,8 @@ export class FrameHost {
   }
 
   #goOnHere() {
-    this.#worker?.terminate();
     this.#worker = null;
-    this.#decoder = FrameDecoder.open(this.#payload, this.#setUp.code);
+    this.#decoder = FrameDecoder.open(this.#payload, this.#code);
     this.#decoder.catch(() => {}); // reported by what is asked
     for (const { job, resolve, reject } of this.#jobs.values()) this.#run(job).then(resolve, reject);
     this.#jobs.clear();
@@ -98,9 +94,9 @@ export class FrameHost {
     if (wanted !== undefined) {
       try {
         const data = (await this.#payload.section(wanted)).slice();
-        this.#worker?.postMessage({ wanted, data, bytes: this.#payload.budget.bytes }, [data.buffer]);
+        this.#worker?.post(this.#file, { wanted, data, bytes: this.#payload.budget.bytes }, [data.buffer]);
       } catch ({ kind = "load", message }) {
-        this.#worker?.postMessage({ wanted, error: { kind, message } });
+        this.#worker?.post(this.#file, { wanted, error: { kind, message } });
       }
       return;
     }

@@ -6,8 +6,14 @@ import { AGAIN, GeometryVideoError } from "../format/errors.js";
 export class RemotePayload {
   #waiting = new Map(); // name -> what to call with its bytes
 
-  /** @param {object} header @param {boolean} isWhole the file is all there @param {string[]} names of sections @param {number} bytes of the file */
-  constructor(header, isWhole, names, bytes) {
+  #ask;
+
+  /**
+   * @param {{header: object, isWhole: boolean, names: string[], bytes: number}} file whether it is all there, names of its sections, its bytes
+   * @param {(name: string) => void} ask for a section
+   */
+  constructor({ header, isWhole, names, bytes }, ask) {
+    this.#ask = ask;
     this.header = header;
     this.isWhole = isWhole;
     this.sections = new Set(names);
@@ -20,7 +26,7 @@ export class RemotePayload {
     if (!this.sections.has(name)) return Promise.reject(new GeometryVideoError("corrupt", `section '${name}' is missing; ${AGAIN}`));
     return new Promise((resolve, reject) => {
       this.#waiting.set(name, [...(this.#waiting.get(name) ?? []), { resolve, reject }]);
-      self.postMessage({ wanted: name });
+      this.#ask(name);
     });
   }
 

@@ -15,7 +15,7 @@ import {
   LAPLACIAN_LAPLACE_OPERATORS_OPERATORS as OPERATORS,
 } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";
-import { checkInteger, checkNumber } from "../format/payload.js";
+import { checkInteger, checkNumber } from "../format/header.js";
 import { readSegments, readSteps } from "../format/segments.js";
 
 export { VERSION };

@@ -16,7 +16,7 @@ import {
   VIDEO_PROFILES as PROFILES,
 } from "../constants.js";
 import { GeometryVideoError, corrupt, quote } from "../format/errors.js";
-import { checkInteger, checkNumber } from "../format/payload.js";
+import { checkInteger, checkNumber } from "../format/header.js";
 import { readSteps } from "../format/segments.js";
 
 export { VERSION, PLANES };

@@ -6,7 +6,7 @@ import {
   PREDICTION_PREDICTORS as PREDICTORS,
 } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";
-import { checkNumber } from "../format/payload.js";
+import { checkNumber } from "../format/header.js";
 import { readSegments, readSteps } from "../format/segments.js";
 
 export { VERSION };

@@ -7,7 +7,7 @@ import {
   SEGMENTS_MAX_SEGMENT as MAX_SEGMENT,
 } from "../constants.js";
 import { corrupt, quote } from "../format/errors.js";
-import { checkInteger } from "../format/payload.js";
+import { checkInteger } from "../format/header.js";
 import { readSegments } from "../format/segments.js";
 
 export { VERSION };

@@ -57,14 +57,16 @@ export class Bar {
   /** @param {import("../geometry_video.js").GeometryVideo} video */
   setVideo(video) {
     this.frames = video.frameCount;
-    this.times = video.metadata.times; // of a simulation, whose steps are no frames of a film
+    const { shots } = video;
+    this.times = shots.length > 1 ? null : video.metadata.times; // of a simulation, whose steps are no frames of a film
     this.slider.max = video.frameCount - 1;
     this.root.querySelector('[data-act="mute"]').hidden = !video.sound;
-    const bits = (8 * video.byteLength) / (video.vertexCount * video.frameCount);
+    const bits = (8 * video.byteLength) / shots.reduce((sum, { vertices, frames }) => sum + vertices * frames, 0);
     this.facts.textContent = [
       ...(video.isLive ? ["live"] : []),
-      `${video.vertexCount.toLocaleString("en")} vertices`,
-      `${video.triangleCount.toLocaleString("en")} triangles`,
+      `${formatSpan(shots.map(({ vertices }) => vertices))} vertices`,
+      `${formatSpan(shots.map(({ triangles }) => triangles))} triangles`,
+      ...(shots.length > 1 ? [`${shots.length} shots`] : []),
       `${video.frameCount} frames at ${Number(video.fps.toPrecision(4))} fps`,
       formatBytes(video.byteLength),
       `${formatRate(video.bitRate)}`,
@@ -120,6 +122,12 @@ export class Bar {
 export function nextSpeed(speed, direction) {
   const sorted = direction > 0 ? SPEEDS : SPEEDS.toReversed();
   return sorted.find((other) => direction * (other - speed) > 0) ?? speed;
+}
+
+/** The least and the most of counts. */
+function formatSpan(counts) {
+  const [low, high] = counts.reduce(([least, most], count) => [Math.min(least, count), Math.max(most, count)], [Infinity, 0]);
+  return [...new Set([low, high])].map((count) => count.toLocaleString("en")).join(" to ");
 }
 
 function formatBytes(count) {

@@ -10,8 +10,8 @@
  * Frames follow the sound's clock while it is heard. Browsers let a page play on its own only if it is `muted`.
  * Properties, methods and events are those of `HTMLMediaElement` where it has them. Events of its own: `ready`, `frame` (detail:
  * the frame's number), `viewchange` (detail: azimuth and elevation that a user turned to), `partschange` (detail: names of
- * hidden parts), `levelchange` (detail: the level of detail that is shown), `probe` (detail: what was clicked on),
- * `clip` (detail: the cut that is shown, or null); `error` has a `GeometryVideoError` as its detail.
+ * hidden parts), `levelchange` (detail: the level of detail that is shown), `shotchange` (detail: the number of the shot that is shown),
+ * `probe` (detail: what was clicked on), `clip` (detail: the cut that is shown, or null); `error` has a `GeometryVideoError` as its detail.
  */
 
 import { breathe } from "../breathe.js";
@@ -287,6 +287,16 @@ export class GeometryVideoElement extends Base {
     this.setAttribute("lod", lod);
   }
 
+  /** Runs of frames of one connectivity (`GeometryVideo.shots`); [] while nothing is loaded. */
+  get shots() {
+    return this.video?.shots ?? [];
+  }
+
+  /** The number of the shot that is shown. */
+  get shot() {
+    return this.video?.shot ?? 0;
+  }
+
   /** The colour map of fields, one of `COLORMAPS`. */
   get colormap() {
     const name = this.getAttribute("colormap");
@@ -476,6 +486,12 @@ export class GeometryVideoElement extends Base {
       }
       this.#tell("levelchange", level);
     });
+    mesh.addEventListener("shotchange", ({ shot }) => {
+      this.#probe.close(); // it has other vertices
+      this.#bar.setNotes(mesh.notes);
+      this.#showMenus();
+      this.#tell("shotchange", shot);
+    });
     for (const name of ["progress", "durationchange"]) {
       mesh.addEventListener(name, () => {
         this.#bar.setVideo(this.video);
@@ -490,6 +506,25 @@ export class GeometryVideoElement extends Base {
     this.#bar.setNotes(mesh.notes);
     this.#panel.setVideo(this.video, mesh.partNames);
     this.hide(this.#hidden);
+  }
+
+  /** The menus and the legend of a shot; those of the shot before stay where it has the same fields and parts. */
+  #showMenus() {
+    const { video } = this;
+    if (this.#panel.differs(video, this.#mesh.partNames)) {
+      this.#panel.setVideo(video, this.#mesh.partNames);
+      this.#panel.setHidden(this.#hidden);
+      const mover = this.warp?.name ?? usualMover(video.fields);
+      this.#panel.setWarp(mover, this.warp?.scale ?? 0, mover === null ? 1 : mostScale(video, video.fields.get(mover)));
+    }
+    this.#showLegend(video.fields.get(this.getAttribute("field")) ?? null, this.#mesh.fieldRange);
+  }
+
+  #showLegend(field, range) {
+    const hasMap = field !== null && field.kind !== "color";
+    this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
+    if (hasMap) this.#legend.show(field, this.colormap, range, isLogarithmic(this.scale, range));
+    else this.#legend.hide();
   }
 
   /**
@@ -559,17 +594,15 @@ export class GeometryVideoElement extends Base {
     this.#say(field ? `Decoding ${field.name} …` : "");
     let range;
     try {
-      range = await this.#stage.showField(field && field.name, { colormap: this.colormap, range: this.range, scale: this.scale });
+      const name = field?.name ?? (video.shots.length > 1 ? this.getAttribute("field") : null); // another shot may have it
+      range = await this.#stage.showField(name, { colormap: this.colormap, range: this.range, scale: this.scale });
     } catch (error) {
       if (video === this.video) this.#interrupt(error);
       return;
     }
     if (showing !== this.#showing || !this.#mesh) return;
     this.#say("");
-    const hasMap = field !== null && field.kind !== "color";
-    this.#panel.setField(field?.name ?? "", this.colormap, hasMap);
-    if (hasMap) this.#legend.show(field, this.colormap, range, isLogarithmic(this.scale, range));
-    else this.#legend.hide();
+    if (range) this.#showLegend(field, range);
     this.#probe.setField(field);
   }
 

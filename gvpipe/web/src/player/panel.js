@@ -28,6 +28,8 @@ const MARKUP = `
   </details>`;
 
 export class Panel {
+  #choices = []; // of what can be shown
+
   /**
    * @param {HTMLElement} root filled with the menus
    * @param {{field: (name: string) => void, colormap: (name: string) => void, warp: (name: string, scale: number) => void,
@@ -66,8 +68,7 @@ export class Panel {
 
   /** @param {import("../geometry_video.js").GeometryVideo} video @param {string[]} parts their names, each once */
   setVideo(video, parts) {
-    const plain = video.materials.length ? "material" : "surface";
-    const shown = [...video.fields.keys()].filter((name) => video.fields.get(name).kind !== "normal"); // they have one length
+    const [plain, ...shown] = (this.#choices = choicesOf(video));
     this.fields.replaceChildren(new Option(plain, ""), ...shown.map((name) => new Option(labelOf(video, name), name)));
     this.fields.parentElement.hidden = !shown.length;
     this.names = parts;
@@ -79,6 +80,11 @@ export class Panel {
     this.filter.value = "";
     this.#listParts();
     this.setField("", COLORMAPS[0], false);
+  }
+
+  /** Whether another video has other choices than the one before. */
+  differs(video, parts) {
+    return JSON.stringify([choicesOf(video), parts]) !== JSON.stringify([this.#choices, this.names]);
   }
 
   clear() {
@@ -150,6 +156,12 @@ export class Panel {
     this.hidden = hidden;
     this.on.hide(hidden);
   }
+}
+
+/** What a video can be shown by: its surface, and fields. */
+function choicesOf({ materials, fields }) {
+  const shown = [...fields.keys()].filter((name) => fields.get(name).kind !== "normal"); // they have one length
+  return [materials.length ? "material" : "surface", ...shown];
 }
 
 function labelOf({ fields }, name) {

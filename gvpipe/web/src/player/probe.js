@@ -53,8 +53,9 @@ export class Probe {
     this.#mark(picked.vertex);
     this.setField(field);
     if (!this.#field) return null;
-    await this.#field.load(frame);
-    const value = valueOf(field, frame, this.#row);
+    const own = video.ownFrame(frame);
+    await this.#field.load(own);
+    const value = valueOf(field, own, this.#row);
     if (picked === this.#picked) this.setFrame(this.#frame);
     return Number.isNaN(value) ? null : value;
   }
@@ -87,7 +88,7 @@ export class Probe {
     if (this.#trace?.take()) this.#draw();
     this.value.textContent = this.#field ? `${titleOf(this.#field)} ${this.#valueText(frame)}` : "";
     this.place.textContent = this.#placeText(frame);
-    const x = this.#field ? (frame / Math.max(1, this.#field.frameCount - 1)) * WIDTH : 0;
+    const x = this.#field ? (this.#video.ownFrame(frame) / Math.max(1, this.#field.frameCount - 1)) * WIDTH : 0;
     this.mark.setAttribute("d", `M${x} 0V${HEIGHT}`);
   }
 
@@ -110,7 +111,7 @@ export class Probe {
   }
 
   #valueText(frame) {
-    const value = valueOf(this.#field, frame, this.#row);
+    const value = valueOf(this.#field, this.#video.ownFrame(frame), this.#row);
     if (value === null) return "…";
     if (Number.isNaN(value)) return "has no value here";
     return `${Number(value.toPrecision(6))} ${this.#field.unit}`;
@@ -119,7 +120,7 @@ export class Probe {
   #placeText(frame) {
     const { vertex, triangle, part } = this.#picked;
     const { metadata, fps } = this.#video;
-    const time = metadata.times?.[frame] ?? frame / fps;
+    const time = metadata.times?.[this.#video.ownFrame(frame)] ?? frame / fps;
     const places = [`vertex ${vertex}`, triangle === null ? "" : `triangle ${triangle}`, part ?? ""];
     return [...places, `frame ${frame}`, `${Number(time.toPrecision(6))} s`].filter(Boolean).join(" · ");
   }

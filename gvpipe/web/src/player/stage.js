@@ -91,8 +91,13 @@ export class Stage {
     this.mesh = mesh;
     mesh.addEventListener("frame", () => this.#frameShown());
     mesh.addEventListener("change", () => this.setMark(this.marked));
-    mesh.addEventListener("levelchange", () => this.#findUsed());
-    this.#findUsed();
+    for (const name of ["levelchange", "shotchange"]) {
+      mesh.addEventListener(name, () => {
+        this.used = null;
+        this.marked = null; // it has other vertices
+      });
+    }
+    this.used = null;
     this.middle = new Vector3();
     this.scene.add(mesh);
     this.camera.up.set(0, up === "z" ? 0 : 1, up === "z" ? 1 : 0);
@@ -324,25 +329,27 @@ export class Stage {
     return front.multiplyScalar(Math.cos(rise)).addScaledVector(up, Math.sin(rise)).applyAxisAngle(up, turn);
   }
 
+  /** Which vertices are drawn. */
   #findUsed() {
     const { indices, vertexCount, triangleCount } = this.mesh.video;
-    const all = Uint32Array.from({ length: vertexCount }, (_, v) => v);
-    this.used = triangleCount ? Uint32Array.from(new Set(indices)) : all; // which vertices are drawn
+    this.used ??= triangleCount ? Uint32Array.from(new Set(indices)) : Uint32Array.from({ length: vertexCount }, (_, v) => v);
+    return this.used;
   }
 
   /** The mean of the vertices drawn, in the scene. */
   #findMiddle() {
     const array = this.mesh.framePositions;
     const sum = [0, 0, 0];
-    for (const v of this.used) for (let axis = 0; axis < 3; axis++) sum[axis] += array[3 * v + axis];
-    return new Vector3(...sum).divideScalar(this.used.length || 1);
+    const used = this.#findUsed();
+    for (const v of used) for (let axis = 0; axis < 3; axis++) sum[axis] += array[3 * v + axis];
+    return new Vector3(...sum).divideScalar(used.length || 1);
   }
 
   /** How far the mesh reaches from a point, along each axis, with room to move. */
   #findReach(point) {
     const array = this.mesh.framePositions;
     const reach = [0, 0, 0];
-    for (const v of this.used) {
+    for (const v of this.#findUsed()) {
       for (let axis = 0; axis < 3; axis++) {
         reach[axis] = Math.max(reach[axis], Math.abs(array[3 * v + axis] - point.getComponent(axis)));
       }

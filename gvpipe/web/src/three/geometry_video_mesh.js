@@ -31,7 +31,8 @@ import { PartIndex } from "./part_index.js";
 import { pickPoint, pickTriangle } from "./picking.js";
 import { polygonEdges } from "./polygon_edges.js";
 import { cornerEntries, splitVertices } from "./render_vertices.js";
-import { Textures } from "./textures.js";
+import { ShotTextures } from "./shot_textures.js";
+import { openTextures, shownImages } from "./textures.js";
 import { colourAttribute, colourArray, uvArray, uvChannels } from "./vertex_attributes.js";
 import { Warp, canMove } from "./warp.js";
 
@@ -52,7 +53,7 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<GeometryVideoMesh>}
    */
   static async create(video, { centre = [0, 0, 0], scale = 1, gloss = true, anisotropy = 1, environment = () => null, ownClock = false } = {}) {
-    const moving = await video.openMoving(shownImages(video));
+    const moving = video.shots.length > 1 ? null : await video.openMoving(shownImages(video)); // textures of shots stand still
     const positions = await video.frame(video.startFrame);
     const textures = await openTextures(video, anisotropy, moving, video.startFrame);
     return new GeometryVideoMesh(video, positions, textures, { moving, centre, scale, gloss, anisotropy, environment, ownClock });
@@ -61,10 +62,14 @@ export class GeometryVideoMesh extends Mesh {
   #view;
   #textures;
   #moving; // MovingImages
+  #shotTextures = null; // of a capture
   #playback;
   #now = 0; // ms of `update`'s clock
   #tick = null; // what waits for its next step
   #level; // that is drawn
+  #shot; // that is drawn
+  #left = []; // what was drawn before: freed once something else was, since three.js forgets shaders that nothing uses
+  #seenRanges = new Map(); // of fields by name, over the shots so far
   #opening = null; // a promise of textures, where a level has others
   #groupsOf = new Map(); // level -> groups
   #groups = null; // (3T) corners that share a normal
@@ -76,11 +81,11 @@ export class GeometryVideoMesh extends Mesh {
   #colours; // attribute, or null
   #materials = [];
   #field = null; // FieldColours
-  #wanted = { field: null }; // shown, or to be shown once it is loaded, and how
+  #wanted = { name: null, field: null }; // shown, or to be shown once it is loaded, and how
   #fieldRange = [0, 0];
   #isLog = false; // whether the field's colours follow the logarithm
   #warp = null; // Warp
-  #wantedWarp = { field: null, scale: 1 }; // shown, or to be shown once its field is loaded
+  #wantedWarp = { name: null, field: null, scale: 1 }; // shown, or to be shown once its field is loaded
   #unmoved = null; // (V, 3) the frame shown, in the geometry's units, before the warp moved it
   #wantedCut = null; // shown, or to be shown once the volume is here
   #plane = null; // of the cut: three.js's, in the scene
@@ -89,6 +94,7 @@ export class GeometryVideoMesh extends Mesh {
   #isFlat = false; // whether each triangle has one normal
   #drawn = this; // what the materials are of: the mesh, or points
   #wires = null;
+  #isWired = false;
   #unfollow;
   #isDisposed = false;
 
@@ -101,12 +107,12 @@ export class GeometryVideoMesh extends Mesh {
     this.#view = view;
     this.#textures = textures;
     this.#moving = view.moving;
-    this.#moving.lost = (note) => (this.notes = [...this.notes, note]);
+    if (this.#moving) this.#moving.lost = (note) => (this.notes = [...this.notes, note]);
     this.frustumCulled = false; // the box of the motion may be a little small
     this.#open(positions, new Set());
     const on = {
       show: (shown, k) => this.#show(shown, k),
-      prepare: (k) => (video.level ? undefined : Promise.all([this.#wanted.field?.load(k), this.#wantedWarp.field?.load(k), this.#fill?.load(k, this.#warp)])),
+      prepare: (k) => (video.level || video.shotOf(k) !== video.shot ? undefined : this.#prepare(k)),
       tell: (type) => this.dispatchEvent({ type }),
       fail: (error) => this.dispatchEvent({ type: "error", error }),
       silent: () => {
@@ -115,7 +121,9 @@ export class GeometryVideoMesh extends Mesh {
       },
     };
     const grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
-    this.#unfollow = video.follow({ grown, lost: on.fail });
+    if (video.shots.length > 1) this.#shotTextures = new ShotTextures(video.shot, textures, view.anisotropy);
+    const ready = (shot, number, own) => Promise.all([this.#shotTextures.ready(shot, number), this.#loadFields(shot, own)]);
+    this.#unfollow = video.follow({ grown, lost: on.fail, ready, closed: (number) => this.#shotTextures.closed(number) });
     this.#playback = new Playback(video, on, view.ownClock ? undefined : (tick) => (this.#tick = tick));
   }
 
@@ -242,6 +250,7 @@ export class GeometryVideoMesh extends Mesh {
 
   /** Show the edges of polygons. @param {boolean} visible */
   setWireframe(visible) {
+    this.#isWired = visible;
     if (visible && !this.#wires && this.video.triangleCount) this.#openWires();
     if (this.#wires) this.#wires.visible = visible;
   }
@@ -260,15 +269,15 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<boolean>} whether it is shown; false if another call came since
    */
   async setWarp(name, scale = 1) {
-    const field = name === null ? null : this.video.fields.get(name);
+    const field = this.#fieldOf(name);
     if (field === undefined || (field && !canMove(field))) throw new RangeError(`there is no field '${name}' of displacements of vertices`);
-    const wanted = (this.#wantedWarp = { field, scale });
-    await field?.load(this.currentFrame);
+    const wanted = (this.#wantedWarp = { name, field, scale });
+    await field?.load(this.#own);
     if (wanted !== this.#wantedWarp || this.#isDisposed) return false;
     if (!field && !this.#warp) return true;
     this.#unmoved ??= this.framePositions.slice();
     this.#warp = field && (field === this.#warp?.field ? Object.assign(this.#warp, { scale }) : new Warp(field, scale));
-    this.#moveVertices(this.currentFrame);
+    this.#moveVertices();
     if (!field) this.#unmoved = null;
     return true;
   }
@@ -285,7 +294,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#plane = cut && (this.#plane ?? new Plane());
     this.updateMatrixWorld(true);
     for (const material of [this.#materials, this.#drawn.material, this.#wires?.material ?? []].flat()) this.#shade(material);
-    if (this.#fill) this.#showFill(this.currentFrame);
+    if (this.#fill) this.#showFill();
     const { volume } = this.video;
     if (!cut || !volume) {
       this.#closeFill();
@@ -299,9 +308,9 @@ export class GeometryVideoMesh extends Mesh {
       this.#colourFill();
       this.add(this.#fill);
     }
-    await this.#fill.load(this.currentFrame, this.#warp);
+    await this.#fill.load(this.#own, this.#warp);
     if (wanted !== this.#wantedCut || !this.#fill || this.#isDisposed) return false;
-    this.#showFill(this.currentFrame);
+    this.#showFill();
     return true;
   }
 
@@ -363,12 +372,17 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<[number, number]|null>} that range; null if another call came since
    */
   async showField(name, { colormap = "viridis", range = null, scale = "linear" } = {}) {
-    const field = name === null ? null : this.video.fields.get(name);
+    const field = this.#fieldOf(name);
     if (field === undefined) throw new RangeError(`there is no field '${name}'; fields: ${[...this.video.fields.keys()].join(", ") || "none"}`);
-    const wanted = (this.#wanted = { field, colormap, range, scale });
-    await field?.load(this.currentFrame);
+    const wanted = (this.#wanted = { name, field, colormap, range, scale });
+    await field?.load(this.#own);
     if (wanted !== this.#wanted) return null;
     return this.#setField(wanted);
+  }
+
+  /** Values of the first and the last colour of the field that is shown. */
+  get fieldRange() {
+    return this.#fieldRange;
   }
 
   /** A mesh that shares geometry and materials, and so moves with this one. */
@@ -379,17 +393,18 @@ export class GeometryVideoMesh extends Mesh {
   /** Free the video, and what the GPU has of it. */
   dispose() {
     this.#isDisposed = true;
-    this.#wanted = { field: null };
-    this.#wantedWarp = { field: null, scale: 1 };
+    this.#wanted = { name: null, field: null };
+    this.#wantedWarp = { name: null, field: null, scale: 1 };
     this.#playback.close();
     this.#unfollow();
     this.#tick = null;
     this.#closeField();
     this.#wantedCut = null;
     this.#closeFill();
-    for (const material of [this.#materials, this.#wires?.material].flat()) material?.dispose();
+    for (const left of [this.#left, this.#materials, this.#wires?.material].flat()) left?.dispose();
     this.#wires?.geometry.dispose();
     this.#textures.dispose();
+    this.#shotTextures?.dispose();
     this.geometry.dispose();
     this.video.close();
   }
@@ -401,14 +416,14 @@ export class GeometryVideoMesh extends Mesh {
 
   #show(positions, k) {
     if (!this.#showPictures(k)) return;
-    if (this.video.level === this.#level) {
-      this.#place(positions, k);
+    if (this.video.level === this.#level && this.video.shot === this.#shot) {
+      this.#place(positions);
       this.#setBounds();
       this.#update();
-      this.#updateField(k);
-      this.#showFill(k);
+      this.#updateField();
+      this.#showFill();
     } else {
-      this.#changeLevel(positions);
+      this.#changeMesh(positions);
     }
     this.dispatchEvent({ type: "frame", frame: k });
   }
@@ -427,9 +442,10 @@ export class GeometryVideoMesh extends Mesh {
   #open(positions, hidden) {
     const { video } = this;
     this.#level = video.level;
+    this.#shot = video.shot;
     /** `Float32Array` (V, 3): the frame shown, in the geometry's units. */
     this.framePositions = new Float32Array(positions.length);
-    this.#place(positions, this.currentFrame);
+    this.#place(positions);
     if (!video.level && !this.#firstBox) {
       this.#firstBox = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
       stretch(this.#firstBox, positions);
@@ -449,46 +465,96 @@ export class GeometryVideoMesh extends Mesh {
     else this.#openPoints();
   }
 
-  #changeLevel(positions) {
+  /** Draw another shot, or another level of detail. */
+  #changeMesh(positions) {
     const { video } = this;
-    this.#dropField();
+    const isShot = video.shot !== this.#shot;
+    const before = this.#left;
+    this.#left = [];
+    this.#dropField(false);
     this.#closeDrawn();
     this.#closeFill();
     this.#warp = this.#unmoved = null; // it comes back with the whole mesh
-    this.#open(positions, this.#parts.hidden);
-    this.dispatchEvent({ type: "levelchange", level: video.level });
-    const { field, ...options } = this.#wanted;
-    if (field && video.fields.has(field.name)) {
-      this.showField(field.name, options).catch((error) => this.#tellError(error));
+    if (isShot) {
+      this.#groupsOf.clear();
+      this.#textures = this.#shotTextures.show(video.shot) ?? this.#textures;
     }
-    const { field: mover, scale } = this.#wantedWarp;
-    if (mover && video.fields.has(mover.name)) {
-      const moved = this.setWarp(mover.name, scale);
+    this.#open(positions, this.#parts.hidden);
+    if (this.#isWired && !this.#wires) this.setWireframe(true);
+    this.#bringBackFields();
+    for (const left of before) left.dispose();
+    this.dispatchEvent(isShot ? { type: "shotchange", shot: video.shot } : { type: "levelchange", level: video.level });
+    if (!video.images.length || this.#textures.images === video.images || (isShot && this.#shotTextures.isShown(video.shot))) return;
+    const opened = isShot ? this.#shotTextures.ready(video, video.shot) : openTextures(video, this.#view.anisotropy, this.#moving, this.currentFrame);
+    this.#opening = opened.then((textures) => this.#takeTextures(textures, video.shot));
+  }
+
+  /** Late ones, of a shot. */
+  #takeTextures(textures, shot) {
+    if (this.#isDisposed || this.video.shot !== shot) {
+      if (!this.#shotTextures) textures.dispose();
+      return;
+    }
+    if (this.#shotTextures) this.#shotTextures.show(shot);
+    else this.#textures.dispose();
+    this.#textures = textures;
+    this.notes = [...this.notes, ...textures.notes];
+    if (this.video.images !== textures.images || !this.video.triangleCount) return;
+    const isFieldShown = this.#field !== null;
+    const { material } = this;
+    this.#closeDrawn();
+    this.#openSurface();
+    if (isFieldShown) this.material = material;
+    this.dispatchEvent({ type: "change" });
+  }
+
+  /** A field of the shot that is shown; undefined: none of that name; null: none, or of other shots. */
+  #fieldOf(name) {
+    return name === null ? null : (this.video.fields.get(name) ?? (this.video.shots.length > 1 ? null : undefined));
+  }
+
+  /** The number of the frame shown in its shot. */
+  get #own() {
+    return this.video.ownFrame(this.currentFrame);
+  }
+
+  /** Have what is shown of a frame of the shot that is drawn. */
+  #prepare(k) {
+    const own = this.video.ownFrame(k);
+    return Promise.all([this.#loadFields(this.video, own), this.#fill?.load(own, this.#warp)]);
+  }
+
+  /** Have values of the fields that are to be shown. @param {import("../geometry_video.js").GeometryVideo} video of the shot @param {number} own frame */
+  #loadFields({ fields }, own) {
+    return Promise.all([this.#wanted, this.#wantedWarp].map(({ name }) => fields.get(name)?.load(own)));
+  }
+
+  /** Show the fields that are wanted on a mesh that is new, at once where their values are here. */
+  #bringBackFields() {
+    const isHere = (field) => field.row(this.#own, 0) !== null;
+    const { name, ...options } = this.#wanted;
+    const field = this.video.fields.get(name);
+    if (field && isHere(field)) this.#setField((this.#wanted = { name, ...options, field }));
+    else if (field) this.showField(name, options).catch((error) => this.#tellError(error));
+    const { name: mover, scale } = this.#wantedWarp;
+    const moves = this.video.fields.get(mover);
+    if (moves && canMove(moves) && isHere(moves)) {
+      this.#unmoved = this.framePositions.slice();
+      this.#warp = new Warp(moves, scale);
+      this.#moveVertices();
+    } else if (moves && canMove(moves)) {
+      const moved = this.setWarp(mover, scale);
       moved.then(() => this.dispatchEvent({ type: "change" }), (error) => this.#tellError(error));
     }
     if (this.#wantedCut) {
       const cut = this.setClip(this.#wantedCut);
       cut.then(() => this.dispatchEvent({ type: "change" }), (error) => this.#tellError(error));
     }
-    if (!video.images.length || this.#textures.images === video.images) return;
-    this.#opening = openTextures(video, this.#view.anisotropy, this.#moving, this.currentFrame).then((textures) => {
-      this.#textures.dispose();
-      this.#textures = textures;
-      this.notes = [...this.notes, ...textures.notes];
-      if (this.#isDisposed) textures.dispose();
-      if (this.#isDisposed || this.video.images !== textures.images || !this.video.triangleCount) return;
-      const isFieldShown = this.#field !== null;
-      const { material } = this;
-      this.#closeDrawn();
-      this.#openSurface();
-      if (isFieldShown) this.material = material;
-      this.dispatchEvent({ type: "change" });
-    });
   }
 
   /** Free materials, and points in place of triangles. */
   #closeDrawn() {
-    for (const material of [this.#materials].flat()) material.dispose();
+    this.#left.push(...[this.#materials].flat());
     if (this.#drawn !== this) this.remove(this.#drawn);
     this.#drawn = this;
     this.material = [];
@@ -507,14 +573,24 @@ export class GeometryVideoMesh extends Mesh {
     const rows = isByTriangle ? corners.map((c) => (c / 3) | 0) : vertices;
     const isPoints = !this.video.triangleCount;
     this.#field = new FieldColours(field, rows, isPoints ? linearTable(colormap) : null);
-    this.#fieldRange = range ?? rangeOf(field, colormap);
+    this.#fieldRange = range ?? this.#rangeOf(field, colormap);
     this.#isLog = isLogarithmic(scale, this.#fieldRange);
     this.geometry.setAttribute(this.#field.name, this.#field.attribute);
     if (isPoints) this.#drawn.material = this.#shade(pointsMaterial(0xffffff, true));
     else this.#drawn.material = this.#shade(fieldMaterial(colormap, this.#field.isColour));
-    this.#updateField(this.currentFrame);
+    this.#updateField();
     this.#colourFill();
     return this.#fieldRange;
+  }
+
+  /** The range of a field; of a capture, over the shots that were shown so far. */
+  #rangeOf(field, colormap) {
+    const range = rangeOf(field, colormap);
+    if (!this.#shotTextures || !field.range) return range;
+    const [low, high] = this.#seenRanges.get(field.name) ?? range;
+    const seen = [Math.min(low, range[0]), Math.max(high, range[1])];
+    this.#seenRanges.set(field.name, seen);
+    return seen;
   }
 
   /** Colours of the field that is shown, on the section. */
@@ -523,25 +599,30 @@ export class GeometryVideoMesh extends Mesh {
     const { colormap } = this.#wanted;
     const field = this.#field?.field;
     this.#fill.setColours(field ? { field, colormap, range: this.#fieldRange, isLog: this.#isLog } : null);
-    this.#showFill(this.currentFrame);
+    this.#showFill();
   }
 
-  /** The section of frame k; until what lies inside is in memory, there is none. */
-  #showFill(k) {
-    const [fill, warp] = [this.#fill, this.#warp];
+  /** The section of the frame shown; until what lies inside is in memory, there is none. */
+  #showFill() {
+    const [fill, warp, k, own] = [this.#fill, this.#warp, this.currentFrame, this.#own];
     if (!fill || !this.#plane || this.video.level) return;
-    const shown = { k, surface: this.framePositions, view: this.#view, warp };
+    const shown = { k: own, surface: this.framePositions, view: this.#view, warp };
     if (fill.update(shown, this.cut)) {
-      if (k + 1 < this.video.frameCount) fill.load(k + 1, warp).catch(() => {}); // reported when it is shown
+      if (this.#isOfShot(k + 1)) fill.load(own + 1, warp).catch(() => {}); // reported when it is shown
       return;
     }
-    fill.load(k, warp).then(
+    fill.load(own, warp).then(
       () => {
         if (this.#fill !== fill || this.currentFrame !== k || this.#isDisposed) return; // another one is shown by now
         if (fill.update({ ...shown, warp: this.#warp }, this.cut)) this.dispatchEvent({ type: "change" });
       },
       (error) => this.#fill === fill && this.#tellError(error),
     );
+  }
+
+  /** Whether there is such a frame, and it is of the shot that is shown. */
+  #isOfShot(k) {
+    return k < this.video.frameCount && this.video.shotOf(k) === this.video.shot;
   }
 
   #closeFill() {
@@ -551,7 +632,7 @@ export class GeometryVideoMesh extends Mesh {
     this.#fill = null;
   }
 
-  #place(positions, k) {
+  #place(positions) {
     const points = this.#warp ? this.#unmoved : this.framePositions;
     const { centre, scale } = this.#view;
     for (let i = 0; i < points.length; i += 3) {
@@ -559,33 +640,34 @@ export class GeometryVideoMesh extends Mesh {
       points[i + 1] = (positions[i + 1] - centre[1]) * scale;
       points[i + 2] = (positions[i + 2] - centre[2]) * scale;
     }
-    if (this.#warp) this.#move(k);
+    if (this.#warp) this.#move();
   }
 
-  /** Move the vertices of frame k; until its displacements are in memory, by those of the frame before. */
-  #move(k) {
+  /** Move the vertices of the frame shown; until its displacements are in memory, by those of the frame before. */
+  #move() {
     const warp = this.#warp;
-    const isThere = warp.read(k);
+    const k = this.currentFrame;
+    const isThere = warp.read(this.#own);
     this.framePositions.set(this.#unmoved);
     warp.move(this.framePositions, this.#view.scale);
     if (isThere) return;
-    warp.field.load(k).then(
+    warp.field.load(this.#own).then(
       () => {
         if (this.#warp !== warp || this.currentFrame !== k || this.#isDisposed) return; // another one is shown by now
-        this.#moveVertices(k);
+        this.#moveVertices();
         this.dispatchEvent({ type: "change" });
       },
       (error) => this.#warp === warp && this.#tellError(error),
     );
   }
 
-  /** Show frame k's vertices moved by the warp as it is now. */
-  #moveVertices(k) {
-    if (this.#warp) this.#move(k);
+  /** Show the frame's vertices moved by the warp as it is now. */
+  #moveVertices() {
+    if (this.#warp) this.#move();
     else this.framePositions.set(this.#unmoved);
     this.#setBounds();
     this.#update();
-    this.#showFill(k);
+    this.#showFill();
   }
 
   /** (3T) which corners share a normal, by the attribute, or by the angles of the frame shown. */
@@ -710,13 +792,14 @@ export class GeometryVideoMesh extends Mesh {
     normal.needsUpdate = true;
   }
 
-  #updateField(k) {
+  #updateField() {
     const colours = this.#field;
-    if (!colours || colours.update(k, this.#fieldRange, this.#isLog)) return;
-    colours.field.load(k).then(
+    const k = this.currentFrame;
+    if (!colours || colours.update(this.#own, this.#fieldRange, this.#isLog)) return;
+    colours.field.load(this.#own).then(
       () => {
         if (this.#field !== colours || this.currentFrame !== k) return; // another one is shown by now
-        colours.update(k, this.#fieldRange, this.#isLog);
+        colours.update(this.#own, this.#fieldRange, this.#isLog);
         this.dispatchEvent({ type: "change" });
       },
       (error) => this.#field === colours && this.dispatchEvent({ type: "error", error }),
@@ -726,15 +809,18 @@ export class GeometryVideoMesh extends Mesh {
   #closeField() {
     if (!this.#field) return;
     const { name } = this.#field;
-    this.#dropField();
+    this.#dropField(true);
     this.geometry.deleteAttribute(name);
     if (this.#isByTriangle || (name === "color" && this.#colours)) this.#build(false); // as it was before the field
   }
 
-  #dropField() {
+  /** @param {boolean} isFreed at once */
+  #dropField(isFreed) {
     if (!this.#field) return;
-    this.#drawn.material.map?.dispose();
-    this.#drawn.material.dispose();
+    const { material } = this.#drawn;
+    const old = material.map ? [material, material.map] : [material];
+    if (isFreed) for (const each of old) each.dispose();
+    else this.#left.push(...old);
     this.#field = null;
   }
 }
@@ -753,17 +839,6 @@ function uncutRay(origin, direction, cut) {
 /** Name of the part that has a vertex or a triangle, or null. */
 function partOf(parts, things, number) {
   return parts.find(({ [things]: [start, stop] }) => start <= number && number < stop)?.name ?? null;
-}
-
-/** Numbers of the images that materials show. */
-function shownImages({ materials }) {
-  const textures = materials.flatMap((material) => Object.values(material).filter((value) => value?.uv !== undefined));
-  return new Set(textures.map(({ image }) => image));
-}
-
-/** The images that materials show, decoded; of those that move, the pictures of a frame. */
-async function openTextures(video, anisotropy, moving, frame) {
-  return Textures.open(video.images, shownImages(video), anisotropy, moving?.show(frame) ?? new Map());
 }
 
 /** Which value of an attribute each render vertex has. */

@@ -21,7 +21,7 @@ const OPTIONS = { imageOrientation: "none", premultiplyAlpha: "none", colorSpace
 
 export class Textures {
   #bitmaps = new Map(); // image -> ImageBitmap, null if it cannot be shown
-  #made = [];
+  #made = new Map(); // by what they are of
   #moving = []; // [texture, number of its image]
 
   /**
@@ -43,6 +43,7 @@ export class Textures {
       const { name, mediaType, data } = images[number];
       if (mediaType === MOVING) {
         textures.pictures.set(number, moving.get(number) ?? null);
+        if (!moving.has(number)) textures.notes.push(`image ${name || number} is not shown: it moves`);
         continue;
       }
       const bitmap = await decode(new Blob([data], { type: mediaType }));
@@ -61,6 +62,12 @@ export class Textures {
   make(texture, channels, isColour) {
     const bitmap = texture && (this.pictures.get(texture.image) ?? this.#bitmaps.get(texture.image));
     if (!bitmap || !channels.has(texture.uv)) return null;
+    const key = JSON.stringify([texture, channels.get(texture.uv), isColour]);
+    if (!this.#made.has(key)) this.#made.set(key, this.#make(texture, bitmap, channels, isColour));
+    return this.#made.get(key);
+  }
+
+  #make(texture, bitmap, channels, isColour) {
     const made = new Texture(bitmap);
     made.flipY = false; // coordinates are turned instead, as glTF has them
     made.channel = channels.get(texture.uv);
@@ -75,7 +82,6 @@ export class Textures {
     made.matrixAutoUpdate = false; // three.js turns before it tiles, glTF after
     made.matrix.set(x * c, y * s, texture.offset[0], -x * s, y * c, texture.offset[1], 0, 0, 1);
     made.needsUpdate = true;
-    this.#made.push(made);
     if (this.pictures.has(texture.image)) this.#moving.push([made, texture.image]);
     return made;
   }
@@ -93,13 +99,29 @@ export class Textures {
   }
 
   dispose() {
-    for (const texture of this.#made) texture.dispose();
+    for (const texture of this.#made.values()) texture.dispose();
     for (const bitmap of this.#bitmaps.values()) bitmap?.close();
-    this.#made = [];
+    this.#made.clear();
     this.#moving = [];
     this.pictures.clear();
     this.#bitmaps.clear();
   }
+}
+
+/** Numbers of the images that materials show. */
+export function shownImages({ materials }) {
+  const textures = materials.flatMap((material) => Object.values(material).filter((value) => value?.uv !== undefined));
+  return new Set(textures.map(({ image }) => image));
+}
+
+/**
+ * The images that materials of a video show, decoded; of those that move, the pictures of a frame.
+ *
+ * @param {import("../moving/moving_images.js").MovingImages|null} [moving] @param {number} [frame]
+ * @returns {Promise<Textures>}
+ */
+export function openTextures(video, anisotropy, moving = null, frame = 0) {
+  return Textures.open(video.images, shownImages(video), anisotropy, moving?.show(frame) ?? new Map());
 }
 
 async function decode(blob) {
