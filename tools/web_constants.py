@@ -47,7 +47,7 @@ SHARED = {
     "gvpipe.container.segments": "TINY HUGE SMALLEST_STEP LARGEST_STEP MAX_SEGMENT",
     "gvpipe.container.live_layout": "HEAD_BYTES LIVE_UUID",
     "gvpipe.container.shared_sections": "MAX_SHARED",
-    "gvpipe.container.shot_layout": "MAGIC SHOT_UUID MAX_SHOTS MAX_HEADER MAX_BYTES MAX_POSTER FARTHEST",
+    "gvpipe.container.shot_layout": "MAGIC MAX_SHOTS MAX_HEADER MAX_BYTES MAX_POSTER FARTHEST",
     "gvpipe.container.stream_layout": "INDEX_UUID ROOM_UUID SHOTS_UUID DATA_UUID MAX_INDEX",
     "gvpipe.coding.corrections.displacements": "MAX_POSITIONS NEAR",
     "gvpipe.entropy.block_coder": "PARAMETRIC",

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from gvpipe.foundation.arguments import StrPath, check_path
 from gvpipe.foundation.errors import InputError
-from gvpipe.model.capture import Capture
-from gvpipe.model.sequence import MeshSequence
-from gvpipe.model.skin import Skin
 from gvpipe.playback import files
+
+if TYPE_CHECKING:
+    from gvpipe.model.capture import Capture
+    from gvpipe.model.sequence import MeshSequence
+    from gvpipe.model.skin import Skin
 
 
 def write(
@@ -32,6 +36,8 @@ def write(
         SettingError: a compression that is not known.
         TypeError: the first argument is no sequence, the second no path, or the skin none.
     """
+    from gvpipe.model.capture import Capture
+
     if not isinstance(sequence, Capture):
         return files.write(sequence, path, start, skin, compress)
     check_path(path, "gvpipe.write's path")

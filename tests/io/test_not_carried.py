@@ -27,6 +27,9 @@ def scan(folder: Path, n_frames: int = 3, shared: bool = False) -> Path:
 
 def test_materials_of_later_frames(tmp_path: Path, run: Any) -> None:
     found = gvpipe.read(scan(tmp_path))
+    assert found.not_carried == () and found.images[0].pictures is not None  # a texture that moves
+    (tmp_path / "m2.mtl").write_text("newmtl a\nmap_Kd t2.png\nKe 1 0 0\n")
+    found = gvpipe.read(tmp_path)
     assert found.not_carried == ("materials and textures of later frames",)
     made = json.loads(run("encode", tmp_path, tmp_path / "a.mp4", "--codec", "pca", "--json").out)
     assert made["not_carried"] == ["materials and textures of later frames"]
@@ -138,7 +141,7 @@ def test_what_each_frame_of_ply_shows(tmp_path: Path) -> None:
 
 
 def test_what_each_frame_of_gltf_shows(tmp_path: Path) -> None:
-    walk = gvpipe.read(scan(tmp_path))
+    walk = gvpipe.read(scan(tmp_path, n_frames=1))
     for frame in range(3):
         color = (1.0, 1.0, 1.0, 1.0) if frame < 2 else (1.0, 0.0, 0.0, 1.0)
         uv = np.array(walk.attributes["uv"].values) / (1 + frame)

@@ -137,7 +137,6 @@ export const SHARED_SECTIONS_MAX_SHARED = 268435456;
 
 // gvpipe.container.shot_layout
 export const SHOT_LAYOUT_MAGIC = [103, 118, 115, 104, 111, 116, 115, 10];
-export const SHOT_LAYOUT_SHOT_UUID = [142, 43, 100, 209, 12, 53, 75, 122, 157, 30, 84, 160, 247, 195, 233, 23];
 export const SHOT_LAYOUT_MAX_SHOTS = 65536;
 export const SHOT_LAYOUT_MAX_HEADER = 4194304;
 export const SHOT_LAYOUT_MAX_BYTES = 1099511627776;
