@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
+from gvpipe.asset_coding.moving_textures import MovingCoding, alpha_notes
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
 from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
@@ -40,7 +41,7 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.model.warp import warped
 from gvpipe.playback.capture_player import CapturePlayer
-from gvpipe.playback.files import Source, frame_range, read, read_capture
+from gvpipe.playback.files import Source, add_texture, add_texture_to_shots, frame_range, read, read_capture
 from gvpipe.playback.player import Player
 from gvpipe.playback.sounds import AudioOptions, sound_beside, with_sound
 from gvpipe.rate_control.codec_choice import choose_codec, default_target
@@ -177,6 +178,9 @@ def encode(
     real_time: bool = False,
     warp: str | None = None,
     volume: bool | None = None,
+    texture: StrPath | None = None,
+    texture_quality: float | None = None,
+    texture_codec: str | None = None,
     track: bool | None = None,
     vertices: int | None = None,
     audio: StrPath | Sound | bool | None = None,
@@ -213,9 +217,12 @@ def encode(
             of a vector's error (a part of the longest) instead of each component's.
         textures: largest side of images, pixels, a format that they are changed to (``"webp"``, ``"jpeg"``, ``"png"``), or
             both: ``"1024,webp"``. None: bytes as they came.
-        clip, mesh, frames, unlimited, real_time, warp: as for `read`.
+        clip, mesh, frames, unlimited, real_time, warp, texture: as for `read`.
         volume: whether what lies inside of a simulation's surface is coded, too. None: of a sequence or a geometry video, yes;
             of other files, if it takes less than a third of the other bytes. A note says what was chosen.
+        texture_quality: of textures with a picture for each frame, 0..100, higher is better; None: 75.
+        texture_codec: of these: ``"h264"``, which all browsers play, ``"hevc"``, ``"av1"``, or ``"copy"`` for the pictures of a
+            video as they are coded. None: ``"copy"`` for a video of H.264 where no quality is given, else ``"h264"``.
         track: of a capture whose frames have meshes of their own: let key meshes follow the surface, so that long shots take
             their place (`gvpipe.captures.tracking`); ``max_error`` then bounds the distance between the surfaces, both ways.
             None: where most frames have a mesh of their own, and nothing but colours would be lost. Without a target, vertices
@@ -250,20 +257,23 @@ def encode(
         workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
     if scheduler is not None or not (workers is None or is_shared):
         check_mapped(given)
+    moving = MovingCoding(texture_codec, texture_quality)
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = _StageClock(progress)
     layout = STREAM if stream else BARE if bare else PLAIN
     with open_executor(scheduler, workers) as executor:
         options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
         options |= {"real_time": real_time, "warp": warp}
-        beside = AssetOptions.of(attributes, fields, textures)
+        beside = AssetOptions.of(attributes, fields, textures, moving)
         if isinstance(source, Capture):
             capture = _some_of(source, frames, fps)
+            capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
             wanted = _CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
             return _encode_capture(capture, wanted, path, clock)
         try:
             sequence, spares_volume, chosen = _open_with_inside(source, path, fps, options, volume)
             sequence = with_sound(sequence, sounds, frames)
+            sequence = sequence if texture is None else add_texture(sequence, texture, frames)
             options["volume"] = sequence.volume is not None
             if memory is not None:
                 given = fit_segments(given, sequence.n_vertices, memory)
@@ -275,6 +285,7 @@ def encode(
             if isinstance(source, MeshSequence):
                 raise
             capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
+            capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
             wanted = _CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
             return _encode_capture(capture, wanted, path, clock)
     size, bitstream = _write(sequence, coded, path, clock, layout)
@@ -438,7 +449,8 @@ def decode(path: StrPath, start: int = 0, stop: int | None = None, lod: int = 0,
     else:  # positions before faces: the video decodes on other threads while the mesh does on this one
         positions, whole = player[start:stop], player.sequence()
     fields = {name: each.part(start, stop) for name, each in whole.fields.items()}
-    return dataclasses.replace(whole, positions=positions, fields=fields, sound=whole.sound_of(start, stop))
+    images = tuple(image.part(start, stop) for image in whole.images)
+    return dataclasses.replace(whole, positions=positions, fields=fields, images=images, sound=whole.sound_of(start, stop))
 
 
 def _player_of(path: StrPath, start: int, stop: int | None, unlimited: bool) -> tuple[Player, int]:
@@ -958,7 +970,8 @@ def _notes(sequence: MeshSequence, target: Target | None, plan: Plan) -> list[st
     diagonal = frame_diagonal(sequence)
     loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
     rounded = notes.rounded(sequence.rounding, diagonal)
-    return [*sequence.notes, *loose, *rounded, *notes.whole_numbers(plan.whole), *notes.not_carried(sorted(plan.left_out))]
+    said = [*loose, *rounded, *notes.whole_numbers(plan.whole), *notes.not_carried(sorted(plan.left_out))]
+    return [*sequence.notes, *said, *alpha_notes(plan.images)]
 
 
 def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:

@@ -2,7 +2,8 @@
 
 `cloth.npz` and `creature.npz` hold `vertices` (F, V, 3) float32 in metres, y up, `faces` (T, 3) int32,
 counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame. `flag.npz` has two parts, quads,
-uv with a texture, normals with hard edges, and a field. `voice.wav` is a tune with a click at each second.
+uv with a texture, normals with hard edges, and a field. `banner.mp4` has a picture for each of its frames. `voice.wav` is a
+tune with a click at each second.
 
     python make_samples.py [OUTPUT_FOLDER]
 """
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from animation import Animation
+from banner import write_banner
 from bounce import make_bounce
 from cloth import make_cloth
 from creature import make_creature
@@ -40,6 +42,8 @@ def main() -> None:
     flag = make_flag()
     gvpipe.write(flag, folder / "flag.npz")
     print(f"flag.npz: {flag.n_frames} frames, {flag.n_vertices} vertices, {len(flag.faces)} triangles")
+    write_banner(folder / "banner.mp4")
+    print(f"banner.mp4: {(folder / 'banner.mp4').stat().st_size / 1e3:.1f} kB")
     bounce = make_bounce()
     write_obj_frames(folder / "ball_frames", bounce)
     n_bytes = sum(file.stat().st_size for file in (folder / "ball_frames").glob("ball_*.obj"))

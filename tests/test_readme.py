@@ -48,7 +48,7 @@ def test_example_of_pictures(in_a_copy: Path) -> None:
 
 def test_examples_of_assets(in_a_copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     examples = re.findall(r"```python\n(.*?)```", ASSETS, re.DOTALL)
-    assert len(examples) == 2
+    assert len(examples) == 3
     for example in examples:
         exec(compile(example, "assets.md", "exec"), {})
     assert "['flag', 'pole'] ['cloth', 'steel']\n(3732, 2) (10, 675) image/png" in capsys.readouterr().out

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gvpipe.asset.material import Image, Material, image_size
+from gvpipe.asset.material import Image, Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part
 from gvpipe.foundation.arrays import Int32
@@ -51,14 +51,19 @@ def list_things(things: Things) -> dict[str, Any]:
         ],
         "polygons": {str(corners): count for corners, count in things.polygons.items()},
         "materials": [material.name for material in things.materials],
-        "images": [
-            {"name": image.name, "media_type": image.media_type, "size": _size(image.data), "bytes": len(image.data)}
-            for image in things.images
-        ],
+        "images": [_image(image) for image in things.images],
         "metadata": {**dataclasses.asdict(things.metadata), "times": list(things.metadata.times)},
     }
 
 
-def _size(data: bytes) -> list[int] | None:
-    found = image_size(data)
-    return None if found is None else list(found)
+def _image(image: Image) -> dict[str, Any]:
+    values = {
+        "name": image.name,
+        "media_type": image.media_type,
+        "size": None if image.size is None else list(image.size),
+        "bytes": len(image.data),
+    }
+    if image.pictures is None:
+        return values
+    coded = {"codec": getattr(image.pictures, "codec", ""), "bytes": getattr(image.pictures, "n_bytes", 0)}
+    return {**values, **coded, "frames": len(image.pictures)}

@@ -10,9 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
+from dataclasses import field as member
 from typing import Any
 
 from gvpipe.asset.attribute import check_word
+from gvpipe.asset.moving import Pictures, SomePictures, as_pictures
 from gvpipe.asset.plain import from_plain, to_plain
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.errors import InputError
@@ -21,6 +23,7 @@ ALPHA_MODES = ("opaque", "mask", "blend")
 WRAPS = ("repeat", "mirror", "clamp")
 FILTERS = ("linear", "nearest")
 MAX_SIDE = 16384  # pixels of an image
+MOVING = "video/mp4"  # media type of moving images, which files hold as video
 MAX_FACTOR = 1e9  # magnitude of a material's numbers
 SIGNATURES = (  # first bytes of pictures
     b"\x89PNG\r\n\x1a\n",
@@ -38,26 +41,52 @@ SIGNATURES = (  # first bytes of pictures
 
 @dataclass(frozen=True)
 class Image:
-    """A picture as it came.
+    """A picture as it came, or a moving image: a picture for each frame.
 
     Args:
         name: for people, and for the file that it is written to.
-        media_type: such as ``"image/png"``.
-        data: the file's bytes.
+        media_type: such as ``"image/png"``; `MOVING` of a moving image.
+        data: the file's bytes; none of a moving image.
+        pictures: of a moving image: an array ``(F, height, width, 3) uint8``, or `gvpipe.asset.moving.Pictures`.
 
     Raises:
         InputError: they are no picture, or one of more than `MAX_SIDE` pixels a side.
     """
 
     name: str
-    media_type: str
-    data: bytes
+    media_type: str = ""
+    data: bytes = b""
+    pictures: Pictures | None = member(default=None, compare=False)
 
     def __post_init__(self) -> None:
+        if self.pictures is not None:
+            object.__setattr__(self, "pictures", as_pictures(self.pictures))
+            object.__setattr__(self, "media_type", MOVING)
         check_image(self)
 
     def __repr__(self) -> str:
+        if self.pictures is not None:
+            width, height = self.pictures.size
+            return f"<Image {self.name}: {len(self.pictures)} pictures of {width}x{height}>"
         return f"<Image {self.name}: {self.media_type}, {len(self.data)} bytes>"
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether each frame has a picture of its own."""
+        return self.pictures is not None
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height in pixels; None where Pillow cannot open it."""
+        return image_size(self.data) if self.pictures is None else self.pictures.size
+
+    def frame(self, number: int) -> Image:
+        """The picture of a frame as an image that stands still, itself if it does; raises as `Pictures.file`."""
+        return self if self.pictures is None else Image(self.name, *self.pictures.file(number))
+
+    def part(self, start: int, stop: int) -> Image:
+        """The image of the frames ``start`` to ``stop``."""
+        return self if self.pictures is None else replace(self, pictures=SomePictures(self.pictures, start, stop))
 
 
 @dataclass(frozen=True)
@@ -208,15 +237,17 @@ def _are_numbers(values: tuple[float, ...]) -> bool:
 
 
 def check_image(image: Image) -> None:
-    """Raise `InputError` unless the bytes are a picture of at most `MAX_SIDE` pixels a side.
+    """Raise `InputError` unless the bytes are a picture of at most `MAX_SIDE` pixels a side, or pictures are of such a size.
 
     A picture that Pillow cannot open is checked by its first bytes alone.
     """
-    if not any(image.data.startswith(signature) for signature in SIGNATURES):
+    if image.pictures is None and not any(image.data.startswith(signature) for signature in SIGNATURES):
         raise InputError(
             f"image {image.name!r} ({image.media_type}, {len(image.data)} bytes) is not a picture; export it as PNG or JPEG"
         )
-    size = image_size(image.data)
+    if image.pictures is not None and (image.data or not len(image.pictures)):
+        raise InputError(f"moving image {image.name!r} has no picture, or bytes beside them; give pictures alone")
+    size = image.size
     if size and max(size) > MAX_SIDE:
         raise InputError(
             f"image {image.name!r} has {size[0]} x {size[1]} pixels; at most {MAX_SIDE} a side are allowed, so make it smaller"

@@ -20,10 +20,11 @@ import numpy as np
 from gvpipe.asset.attribute import DOMAINS, KINDS, MAX_COMPONENTS, Attribute
 from gvpipe.asset.field import DOMAINS as FIELD_DOMAINS
 from gvpipe.asset.field import Field
-from gvpipe.asset.material import Image, Material, check_materials
+from gvpipe.asset.material import MOVING, Image, Material, check_materials
 from gvpipe.asset.metadata import NO_METADATA, Metadata
 from gvpipe.asset.part import Part
 from gvpipe.asset.plain import from_plain, to_plain
+from gvpipe.asset_coding.moving_textures import read_moving
 from gvpipe.asset_coding.reduction import Reduction, read_reduction
 from gvpipe.asset_coding.sound_track import read_sound
 from gvpipe.asset_coding.times import SECTION as TIMES
@@ -173,10 +174,15 @@ def read_directory(bitstream: Bitstream) -> Directory:
     return dataclasses.replace(directory, metadata=dataclasses.replace(directory.metadata, times=times))
 
 
-def read_images(directory: Directory, bitstream: Bitstream) -> tuple[Image, ...]:
-    """The images that a directory lists; raises `CorruptFile`."""
+def read_images(directory: Directory, bitstream: Bitstream) -> tuple[Image | None, ...]:
+    """The images that a directory lists, None for moving images whose track is lost; raises `CorruptFile`."""
+    names = {number: each.name for number, each in enumerate(directory.images) if each.media_type == MOVING}
+    moving = read_moving(bitstream.companions, names, bitstream.n_frames, bitstream.budget) if names else {}
     try:
-        return tuple(Image(each.name, each.media_type, bitstream.section(each.section)) for each in directory.images)
+        return tuple(
+            moving.get(number) if number in names else Image(each.name, each.media_type, bitstream.section(each.section))
+            for number, each in enumerate(directory.images)
+        )
     except InputError as exc:
         raise corrupt_section(SECTION, str(exc)) from exc
 

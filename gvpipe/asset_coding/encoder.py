@@ -16,7 +16,7 @@ import numpy as np
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.listing import count_polygons
-from gvpipe.asset.material import Image, image_size
+from gvpipe.asset.material import Image
 from gvpipe.asset.metadata import NO_METADATA, Metadata, with_losses
 from gvpipe.asset.part import Part
 from gvpipe.asset.texts import Cleaner
@@ -36,6 +36,7 @@ from gvpipe.asset_coding.directory import (
     vertex_starts,
 )
 from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
+from gvpipe.asset_coding.moving_textures import code_moving
 from gvpipe.asset_coding.normal_fields import find_normal_rule, pack_rule
 from gvpipe.asset_coding.options import NO_OPTIONS, AssetOptions
 from gvpipe.asset_coding.pictures import limit_image
@@ -53,6 +54,7 @@ from gvpipe.attributes.triangle_order import Arrangement, SourceCorners, encode_
 from gvpipe.coding.codec import Codec, Encoded, FrameReader
 from gvpipe.coding.registry import open_reader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.companion import Companion
 from gvpipe.container.outline import Outline
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.mesh import FieldMesh
@@ -61,6 +63,7 @@ from gvpipe.fields.values import FieldBound
 from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.runtime.forks import kept
 
 MOVING = ("scalar", "vector")  # kinds of fields that may follow from positions
 
@@ -94,7 +97,7 @@ def plan_asset(sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> Pl
     check_names(options.attributes, sequence.attributes, "attribute")
     check_names(options.fields, sequence.fields, "field")
     images = tuple(limit_image(image, options.textures) for image in sequence.images)
-    texels = max((max(image_size(image.data) or (0,)) for image in images), default=0)
+    texels = max((max(image.size or (0,)) for image in images), default=0)
     attributes, fields, left_out, whole = {}, {}, [], []
     for name, attribute in sequence.attributes.items():
         values = attribute.values
@@ -148,6 +151,7 @@ class AssetCoder:
     def __init__(self, sequence: MeshSequence, options: AssetOptions = NO_OPTIONS) -> None:
         self._sequence = sequence
         options = _by_what_they_are(options, sequence)
+        self._options = options
         self.plan = plan_asset(sequence, options)
         volume = sequence.volume
         kept = {**self.plan.attributes, **self.plan.fields}
@@ -226,8 +230,9 @@ class AssetCoder:
             sections[TIMES] = pack_times(metadata.times)
         images = []
         for number, image in enumerate(self.plan.images):
-            images.append(ListedImage(image.name, image.media_type, f"image.{number}"))
-            sections[images[-1].section] = image.data
+            images.append(ListedImage(image.name, image.media_type, "" if image.is_moving else f"image.{number}"))
+            if not image.is_moving:
+                sections[images[-1].section] = image.data
         directory = Directory(
             parts=parts,
             geometry=same_bits,
@@ -240,9 +245,14 @@ class AssetCoder:
         return dataclasses.replace(
             encoded.bitstream,
             sections={**sections, SECTION: pack_directory(directory, len(permutation))},
-            companions=self._companions,
             outline=_with_counts(encoded.bitstream.outline, arrangement, len(parts)),
+            companions=(*self._companions, *self._moving),
         )
+
+    @kept
+    def _moving(self) -> tuple[Companion, ...]:
+        """Tracks of moving images, the same for all bitstreams."""
+        return code_moving(self.plan.images, self._sequence, self._options.moving)
 
     def _arrange(self, decoded: Int32, place: Int32, parts: tuple[Part, ...]) -> tuple[bytes, Arrangement, SourceCorners]:
         sequence = self._sequence

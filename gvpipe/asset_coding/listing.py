@@ -31,11 +31,12 @@ def list_asset(directory: Directory, outline: Outline, bitstream: Bitstream) -> 
         CorruptFile: the outline counts other parts than the directory has, or an image is none.
     """
     is_read = directory.version <= VERSION  # else parts and polygons are not read either
+    images = [image for image in read_images(directory, bitstream) if image is not None]
     parts = _parts(directory.parts, outline.part_triangles) if is_read else []
     polygons = outline.polygons if is_read else {}
     return {
         "not_carried": losses_of(directory.metadata),
-        **list_things(Things(parts, polygons, directory.materials, read_images(directory, bitstream), directory.metadata)),
+        **list_things(Things(parts, polygons, directory.materials, images, directory.metadata)),
         "attributes": _listed(directory.attributes, bitstream),
         "fields": [
             {**values, "range": listed.range and list(listed.range)}

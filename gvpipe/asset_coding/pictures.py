@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from gvpipe.asset.material import Image
+from gvpipe.asset_coding.moving_textures import SmallerPictures
 from gvpipe.foundation.errors import InputError, SettingError
 
 FORMATS = {"webp": "image/webp", "jpeg": "image/jpeg", "png": "image/png"}
@@ -43,11 +44,14 @@ class TextureLimit:
 
 
 def limit_image(image: Image, limit: TextureLimit) -> Image:
-    """Return an image within the limit; its bytes are unchanged if they are already.
+    """Return an image within the limit; its bytes are unchanged if they are already. The format is not that of moving images.
 
     Raises:
         InputError: Pillow cannot open it.
     """
+    if image.pictures is not None:
+        is_large = limit.side and max(image.pictures.size) > limit.side
+        return replace(image, pictures=SmallerPictures(image.pictures, limit.side)) if is_large else image
     if not limit.side and limit.format in ("", image.media_type.removeprefix("image/")):
         return image
     from PIL import Image as Pillow

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.field import Field
-from gvpipe.asset.material import Image, Material
+from gvpipe.asset.image_choice import without_images
+from gvpipe.asset.material import MOVING, Image, Material
 from gvpipe.asset.metadata import Metadata
 from gvpipe.asset.part import Part, check_parts
 from gvpipe.asset.polygons import as_polygons
@@ -134,12 +135,18 @@ class AssetReader:
     @property
     def materials(self) -> tuple[Material, ...]:
         """What the parts look like."""
-        return self.directory.materials
+        has_moving = any(each.media_type == MOVING for each in self.directory.images)
+        return self._looks[0] if has_moving else self.directory.materials
 
-    @kept
+    @property
     def images(self) -> tuple[Image, ...]:
         """What the materials' textures show."""
-        return read_images(self.directory, self._bitstream)
+        return self._looks[1]
+
+    @kept
+    def _looks(self) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+        """Materials and images, without moving images whose track is lost."""
+        return without_images(self.directory.materials, read_images(self.directory, self._bitstream))
 
     @kept
     def volume(self) -> Volume | None:

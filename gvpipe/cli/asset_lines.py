@@ -47,7 +47,8 @@ def asset_lines(info: Info | SourceInfo) -> Iterator[str]:
         yield f"materials: {_names(info.materials)}"
     for image in info.images:
         size = "x".join(map(str, image["size"])) if image["size"] else "size unknown"
-        yield f"image {image['name']}: {image['media_type']}, {size}, {image['bytes']} bytes"
+        kind = f"{image['frames']} pictures, {image['codec'] or 'files'}" if "frames" in image else image["media_type"]
+        yield f"image {image['name']}: {kind}, {size}" + (f", {image['bytes']} bytes" if image["bytes"] else "")
     if (volume := getattr(info, "volume", None)) is not None:
         names = ", ".join([*volume["point_fields"], *volume["cell_fields"]]) or "no numbers"
         yield f"volume: {volume['cells']} cells, {volume['points']} inner points, {names}, {volume['bytes']} bytes"

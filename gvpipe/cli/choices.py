@@ -28,6 +28,17 @@ def parse_frames(text: str | None) -> tuple[int, int | None] | None:
         raise click.UsageError(f"--frames {text}: A:B is needed, such as --frames 10:50") from exc
 
 
+def parse_texture(pictures: str | None, video: str | None) -> str | None:
+    """What ``--texture`` or ``--texture-video`` names; raises `click.UsageError`."""
+    from gvpipe.io.picture_rows import VIDEOS
+
+    if pictures is not None and video is not None:
+        raise click.UsageError("give --texture or --texture-video, not both")
+    if video is not None and not video.lower().endswith(VIDEOS):
+        raise click.UsageError(f"--texture-video {video}: a video is needed ({', '.join(VIDEOS)}); pictures go with --texture")
+    return video if pictures is None else pictures
+
+
 def parse_bytes(option: str, text: str) -> int:
     """``500MB`` as 500,000,000: a number of bytes, kB, MB, GB or TB; raises `click.UsageError`."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(|k|M|G|T)B?", text, re.ASCII | re.IGNORECASE)

@@ -20,7 +20,7 @@ import click
 from gvpipe import __version__
 from gvpipe.cli.audio_options import audio_options, parse_audio, sound_path, write_beside
 from gvpipe.cli.benchmarks import bench, plot
-from gvpipe.cli.console import Output, compress_option, is_verbose, output_options, unlimited_option
+from gvpipe.cli.console import Output, compress_option, is_verbose, output_options, texture_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
 from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_settings
@@ -101,6 +101,7 @@ def cli() -> None:
     help="Code segments in N processes: same bytes. Not for codec mcgv. [default: a minute of work gets one for each core]",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Code them on a Dask cluster, such as tcp://host:8786.")
+@texture_options
 @output_options
 def encode(
     sources: tuple[str, ...],
@@ -109,6 +110,8 @@ def encode(
     live: bool,
     workers: int | None,
     scheduler: str | None,
+    texture: str | None,
+    texture_video: str | None,
     out: Output,
     **options: Any,
 ) -> None:
@@ -122,6 +125,7 @@ def encode(
     """
     from gvpipe import api
     from gvpipe.captures.splitting import with_sounds, write_runs
+    from gvpipe.cli.choices import parse_texture
     from gvpipe.cli.process import give_back_memory
     from gvpipe.playback import files
 
@@ -132,9 +136,13 @@ def encode(
         raise click.UsageError("- is one input among others; give it alone", click.get_current_context())
     if split and target == PIPE:
         raise click.UsageError("--split writes several files, and OUTPUT is -; give a file's name", click.get_current_context())
+    shown_by = parse_texture(texture, texture_video)
     if live:
-        _encode_live(sources, target, {**options, "split": split, "workers": workers, "scheduler": scheduler}, out)
+        more = {"split": split, "workers": workers, "scheduler": scheduler, "texture": shown_by}
+        _encode_live(sources, target, {**options, **more}, out)
         return
+    if split and shown_by is not None:
+        raise click.UsageError("--split makes several films, and --texture is for one; encode each run with --frames")
     if (workers is not None or scheduler is not None) and (split or PIPE in sources):
         message = "--workers and --scheduler read INPUT by its path, as a whole; leave out --split, and name no -"
         raise click.UsageError(message, click.get_current_context())
@@ -152,8 +160,8 @@ def encode(
             )
         else:
             shared = "auto" if workers is None and PIPE not in sources else workers
-            keywords = {**asked.keywords, **sound}
-            report = api.encode(source, path, asked.codec, progress, **keywords, workers=shared, scheduler=scheduler)
+            keywords = {**asked.keywords, **sound, "workers": shared, "scheduler": scheduler, "texture": shown_by}
+            report = api.encode(source, path, asked.codec, progress, **keywords)
     out = out.carrying(target)
     name = shown(sources[0], STDIN) + (f" and {len(sources) - 1} more" if len(sources) > 1 else "")
     if not split:
@@ -218,6 +226,7 @@ def _print_report(out: Output, report: Report, name: str, target: str) -> None:
 @click.option("--skin/--no-skin", default=None, help="Of a .glb or USD: a skeleton or none. [default: of a .glb if exact]")
 @click.option("--audio-out", metavar="FILE", help="Where the sound goes: .m4a, .wav or none. [default: OUTPUT's name, .m4a]")
 @compress_option
+@click.option("--texture-out", metavar="FILE.mp4", help="Write the textures that move as videos, too, as they are coded.")
 @unlimited_option
 @output_options
 def decode(
@@ -233,6 +242,7 @@ def decode(
     skin: bool | None,
     audio_out: str | None,
     compress: str,
+    texture_out: str | None,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -251,6 +261,7 @@ def decode(
     from gvpipe.io.writing import takes_skin
     from gvpipe.media.sound_files import check_sound_target
     from gvpipe.playback import files
+    from gvpipe.playback.texture_files import write_tracks
 
     out = out.carrying(target)
     check_glb_options(target, skin is True, compress)
@@ -271,6 +282,7 @@ def decode(
         level = player.level(lod)
         sequence = chosen(level.part(begin, end), parts, fps, "decode", progress)
         found, said = skin_of_video(player, path, (begin, end), skin, is_whole=not parts and not lod)
+        tracks = write_tracks(player, texture_out) if texture_out else []
         silent = sequence.with_sound(None)
         noticed = [*said, *files.write(silent.local() if local else silent, path, start, found, compress)]
         sound, heard = write_beside(sequence.sound, sound_target, audio_out)
@@ -282,6 +294,7 @@ def decode(
         out.note(note)
     values = {"output": shown(target, STDOUT), "frames": stop - start, "start": start, "stop": stop, "fps": sequence.fps}
     values |= {"vertices": sequence.n_vertices, "triangles": len(sequence.faces), "lod": lod}
+    values |= {"textures": tracks} if tracks else {}
     values |= {"joints": found.joints if found else 0} if takes_skin(str(target)) else {}
     values |= {"audio": {"output": sound_target, **sound.to_json()}} if sound else {}
     out.json({**values, "origin": [0.0, 0.0, 0.0] if local else player.origin.tolist(), "notes": noticed})

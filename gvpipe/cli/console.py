@@ -115,6 +115,17 @@ real_time_option = click.option(
     is_flag=True,
     help="Keep a simulation's clock. [default: steps under 1/240 s or over 2 s become 25 frames a second; times are kept]",
 )
+
+
+def texture_options(command: Command) -> Command:
+    """Give a command ``--texture`` and ``--texture-video``."""
+    video = click.option("--texture-video", metavar="FILE", help="The same from a video.")
+    pictures = click.option(
+        "--texture", metavar="FOLDER|PATTERN", help="A picture for each frame, in place of the colours' texture."
+    )
+    return pictures(video(command))
+
+
 volume_option = click.option(
     "--volume/--no-volume",
     default=None,

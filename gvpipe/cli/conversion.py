@@ -16,6 +16,7 @@ from gvpipe.cli.console import (
     compress_option,
     output_options,
     real_time_option,
+    texture_options,
     unlimited_option,
     volume_option,
     warp_option,
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
 @warp_option
 @volume_option
 @compress_option
+@texture_options
 @unlimited_option
 @output_options
 def convert(
@@ -92,6 +94,8 @@ def convert(
     warp: str | None,
     volume: bool | None,
     compress: str,
+    texture: str | None,
+    texture_video: str | None,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -101,7 +105,7 @@ def convert(
     what a format cannot hold, which is said.
     """
     from gvpipe.cli.captures import write_shots
-    from gvpipe.cli.choices import chosen, chosen_frames, parse_frames
+    from gvpipe.cli.choices import chosen, chosen_frames, parse_frames, parse_texture
     from gvpipe.cli.skeletons import (
         ALL,
         SkinOptions,
@@ -116,6 +120,9 @@ def convert(
     from gvpipe.playback import files
 
     out = out.carrying(target)
+    shown_by = parse_texture(texture, texture_video)
+    if shown_by is not None and (split or lod or clip == ALL):
+        raise click.UsageError("--texture goes with one film: not with --split, --lod and --clip all")
     first, last = chosen_frames(start, stop, frames)
     _check_target(source, target)
     number, is_rigid = parse_joints(joints)
@@ -137,9 +144,7 @@ def convert(
             read = (
                 _level_reader(given, lod, unlimited)
                 if lod
-                else partial(
-                    files.read, given, clip=clip, mesh=mesh, unlimited=unlimited, real_time=real_time, warp=warp, volume=volume
-                )
+                else partial(files.read, given, clip=clip, mesh=mesh, texture=shown_by, **how)
             )
             clips: tuple[Clip, ...] = ()
             if clip == ALL and (names := clip_names(given)):

@@ -72,6 +72,12 @@ OPTIONS = (
     ),
     click.option("--vertices", type=int, metavar="N", help="Of each mesh that follows. [default: as few as will do]"),
     click.option("--textures", metavar="N|FORMAT", help="Largest side of images, webp, jpeg or png, or both: 1024,webp."),
+    click.option("--texture-quality", type=float, help="0-100, of textures with a picture for each frame. [default: 75]"),
+    click.option(
+        "--texture-codec",
+        type=click.Choice(["h264", "hevc", "av1", "copy"]),
+        help="Of these; copy: a video as it is. All browsers play h264. [default: copy for a video of H.264, else h264]",
+    ),
     click.option(
         "--stream",
         is_flag=True,
@@ -143,6 +149,7 @@ def parse_encoding(options: dict[str, Any]) -> Encoding:
         codec, making = None, {name: getattr(codec, name) for name in settings}
     making |= {"track": None if options["track"] is None else options["track"] == "on", "vertices": options["vertices"]}
     making |= {**targets, "textures": options["textures"], "stream": options["stream"], "bare": options["bare"]}
+    making |= {name: options[name] for name in ("texture_quality", "texture_codec")}
     making["memory"] = None if options["memory"] is None else parse_bytes("--memory", options["memory"])
     making["attributes"] = _parse_bounds("--attribute", options["attributes"])
     making["fields"] = _parse_bounds("--field", options["fields"])

@@ -46,6 +46,10 @@ DAMAGED = "is damaged, or was re-encoded"
 LARGEST_PLACE = (1 << 32) - 1
 
 
+Load = Callable[[], bytes]
+Part = Callable[[int, int], bytes]
+
+
 class StoredSections(Protocol):
     """Sections by name, each read when it is asked for (`gvpipe.container.stream_layout.StoredSections`)."""
 
@@ -55,6 +59,10 @@ class StoredSections(Protocol):
 
     def offset(self, name: str) -> int:
         """Where a section begins in the file."""
+        ...
+
+    def part(self, name: str, start: int, stop: int) -> bytes:
+        """Some bytes of a section, unchecked; raises `FormatError` if they are not there."""
         ...
 
 
@@ -69,6 +77,7 @@ class Companion:
         trak: its box, numbered 1, places of chunks from the first sample on.
         mvhd: of its film.
         load: returns its samples; raises `FormatError` if they are not at hand.
+        part: returns some of their bytes, unchecked, between two places; None: where all are at hand.
     """
 
     kind: str
@@ -78,6 +87,7 @@ class Companion:
     trak: bytes = field(repr=False)
     mvhd: bytes = field(repr=False, compare=False)
     load: Callable[[], bytes] = field(repr=False, compare=False)
+    part: Callable[[int, int], bytes] | None = field(default=None, repr=False, compare=False)
 
     @classmethod
     def of(cls, kind: str, about: Mapping[str, Any], file: bytes) -> Companion:
@@ -119,6 +129,13 @@ class Companion:
         file = b"".join([ftyp, moov, *content])
         check_tables(moov, len(file))
         return file
+
+    def head(self) -> bytes:
+        """The start of the file of this track alone, up to its first sample; raises `CorruptFile` as `file`."""
+        start = len(FTYP) + BOX.size + len(self.mvhd) + len(self.trak) + BOX.size
+        moov = _moov(with_duration(self.mvhd, [self.trak], 0), [shifted(self.trak, start)])
+        check_tables(moov, start + self.n_bytes)
+        return FTYP + moov + BOX.pack(BOX.size + self.n_bytes, b"mdat")
 
     def to_json(self) -> dict[str, Any]:
         """Its entry in the header."""
@@ -245,7 +262,7 @@ def detach(file: bytes, described: Sequence[Described], n_own: int) -> Found:
         return Found(geometry_of(file), (), _gone(described))
     video = geometry_of(file) if n_own else b""
     places = data[len(data) - len(described) :]
-    loads = [(place.content, partial(bytes, file[place.content : place.stop])) for place in places]
+    loads = [(place.content, partial(bytes, file[place.content : place.stop]), None) for place in places]
     companions, damaged = _restored(described, moov, traks[n_own:], loads)
     found, lost = whole(companions)
     return Found(video, found, (*damaged, *lost))
@@ -282,7 +299,7 @@ def detach_head(head: bytes, described: Sequence[Described], sections: StoredSec
     names = [f"{SECTION}{number}" for number in range(len(described))]
     if len(traks) != 1 + len(described) or not all(name in sections for name in names):
         return Found(own, (), _gone(described))
-    loads = [(sections.offset(name), partial(sections.__getitem__, name)) for name in names]
+    loads = [(sections.offset(name), partial(sections.__getitem__, name), partial(sections.part, name)) for name in names]
     return Found(own, *_restored(described, moov, traks[1:], loads))
 
 
@@ -291,14 +308,14 @@ def whole(companions: Sequence[Companion]) -> tuple[tuple[Companion, ...], tuple
     kept, lost = list[Companion](), list[str]()
     for each in companions:
         try:
-            kept.append(replace(each, load=partial(bytes, each.data())))
+            kept.append(replace(each, load=partial(bytes, each.data()), part=None))
         except FormatError as exc:
             lost.append(_lost(each.kind, DAMAGED if isinstance(exc, CorruptFile) else f"cannot be read ({exc.what})"))
     return tuple(kept), tuple(lost)
 
 
 def _restored(
-    described: Sequence[Described], moov: bytes, tracks: Sequence[Span], loads: Sequence[tuple[int, Callable[[], bytes]]]
+    described: Sequence[Described], moov: bytes, tracks: Sequence[Span], loads: Sequence[tuple[int, Load, Part | None]]
 ) -> tuple[tuple[Companion, ...], tuple[str, ...]]:
     """Companions whose tables are whole, and what is wrong with the others.
 
@@ -306,19 +323,19 @@ def _restored(
         described: what the header says of each.
         moov: the file's box, with their tracks.
         tracks: where the ``trak`` box of each is.
-        loads: of each, the place of its first sample in the file, and what returns its samples.
+        loads: of each, the place of its first sample in the file, what returns its samples, and what some of their bytes.
     """
     mvhd = header_of(moov)
     found, lost = list[Companion](), list[str]()
     first = len(tracks_of(moov)) - len(tracks) + 1
-    for number, (each, track, (start, load)) in enumerate(zip(described, tracks, loads, strict=True), first):
+    for number, (each, track, (start, load, part)) in enumerate(zip(described, tracks, loads, strict=True), first):
         given = track.of(moov)
         try:
             trak = numbered(shifted(given, -start), 1) if numbered(given, number) == given else b""
         except CorruptFile:
             trak = b""
         if zlib.crc32(trak) == each.trak_checksum:
-            found.append(Companion(each.kind, each.about, each.n_bytes, each.checksum, trak, mvhd, load))
+            found.append(Companion(each.kind, each.about, each.n_bytes, each.checksum, trak, mvhd, load, part))
         else:
             lost.append(_lost(each.kind, DAMAGED))
     return tuple(found), tuple(lost)

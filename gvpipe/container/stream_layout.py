@@ -303,6 +303,13 @@ class StoredSections(Mapping[str, bytes]):
             raise corrupt_section(name, "its checksum does not match")
         return data
 
+    def part(self, name: str, start: int, stop: int) -> bytes:
+        """Some bytes of a section, unchecked; raises `CorruptFile` if it ends before."""
+        place = self._places[name]
+        if not 0 <= start <= stop <= place.length:
+            raise corrupt_section(name, f"bytes {start} to {stop} are asked for; it has {place.length}")
+        return self._source.read(place.offset + start, stop - start)
+
     def __contains__(self, name: object) -> bool:
         return name in self._places
 

@@ -85,12 +85,15 @@ class FrameEncoder:
         fields: names of the fields that it wants; no others are read.
         notes: what the format cannot hold, a line each.
         beside: files that all frames share, such as pictures, by their names in the frames' folder.
+        of_frame: what a frame has of its own, given its number and the number in its file's name: text before what ``encode``
+            returns, and files in the frames' folder by their names. None: nothing.
     """
 
     encode: Callable[[Float32, Mapping[str, Array]], bytes]
     fields: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     beside: Mapping[str, bytes] = field(default_factory=dict)
+    of_frame: Callable[[int, str], tuple[bytes, Mapping[str, bytes]]] | None = None
 
 
 EncoderMaker = Callable[[MeshSequence, str], FrameEncoder]  # a sequence, and a name for files that all frames share

@@ -71,12 +71,13 @@ class Pictures:
     def _number(self, path: Path) -> int:
         """The number of a file's image, which is read the first time."""
         if path not in self._paths:
-            self.images.append(_read(path))
+            self.images.append(read_picture(path))
             self._paths[path] = len(self.images) - 1
         return self._paths[path]
 
 
-def _read(path: Path) -> Image:
+def read_picture(path: Path) -> Image:
+    """A file as an image; raises `InputError`."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise InputError(f"{path} has more than {MAX_BYTES >> 20} MB; make it smaller")

@@ -22,6 +22,9 @@ USD_SKIN_WRITER = late("usd.writer", "write_usd")
 GLB_WRITER = late("gltf", "write_animated")
 VTU_WRITER = late("simulation.vtu_writer", "write_vtu")
 HOLD_VOLUMES = (".vtu", ".pvd", ".vtkhdf", ".xdmf")
+HOLD_MOVING = (".obj", "", *USD)
+HOLD_PICTURES = (".npz", ".glb", ".gltf", ".ply", ".openvat")
+STILL = "{} has no textures that move: each shows the picture of its first frame; --texture-out writes them as a video"
 COMPRESSIONS = ("none", "meshopt")
 
 
@@ -78,6 +81,10 @@ def write(
     is_packed = compress != "none"
     if is_packed and not is_glb(path):
         raise InputError(f"{path}: a compressed file is one .glb; give such a name, or leave the compression out")
+    if suffix not in HOLD_MOVING and any(image.is_moving for image in sequence.images):
+        still = sequence.with_looks(sequence.materials, tuple(image.frame(0) for image in sequence.images))
+        said = (STILL.format(suffix),) if suffix in HOLD_PICTURES else ()
+        return (*write(still, path, start, skin, compress), *said)
     if skin is not None:
         if not takes_skin(path):
             raise InputError(f"{path}: a skeleton is written as one .glb or USD file; give such a name, or leave the skin out")

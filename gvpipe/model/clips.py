@@ -56,4 +56,5 @@ def join_clips(named: Sequence[tuple[str, MeshSequence]]) -> tuple[MeshSequence,
             raise InputError(f"clip {name!r} of {each.name} has another frame rate or origin than {named[0][0]!r}; give --fps")
     starts = np.cumsum([0, *(each.n_frames for _, each in named)]).tolist()
     clips = tuple(Clip(name, start, stop) for (name, _), start, stop in zip(named, starts[:-1], starts[1:], strict=True))
-    return replace(first, positions=Joined([each for _, each in named]), fields={}, volume=None), clips
+    images = tuple(image.frame(0) for image in first.images)
+    return replace(first, positions=Joined([each for _, each in named]), fields={}, volume=None, images=images), clips

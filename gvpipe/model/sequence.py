@@ -146,6 +146,11 @@ class MeshSequence:
         for image in self.images:
             if not isinstance(image, Image):
                 raise TypeError(f"an image is {show(image)}; a gvpipe.Image is needed")
+            if image.pictures is not None and len(image.pictures) != self.n_frames:
+                raise InputError(
+                    f"{self.name}: moving image {image.name!r} has {len(image.pictures)} pictures, the sequence has "
+                    f"{self.n_frames} frames; give one picture for each frame"
+                )
         if self.volume is not None:
             self.volume.check_surface(self.n_frames, self.n_vertices, self.name)
         cleaner = Cleaner(self.name)
@@ -299,7 +304,9 @@ class MeshSequence:
         fields = {name: each.part(start, stop) for name, each in self.fields.items()}
         metadata = self.metadata.of_frames(start, stop, self.n_frames, self.fps)
         volume = None if self.volume is None else self.volume.part(start, stop)
-        beside = {"fields": fields, "metadata": metadata, "volume": volume, "sound": self.sound_of(start, stop)}
+        images = tuple(image.part(start, stop) for image in self.images)
+        beside: dict[str, Any] = {"fields": fields, "images": images, "metadata": metadata, "volume": volume}
+        beside["sound"] = self.sound_of(start, stop)
         return self._derived(Span(self.read, start, *size), exact, **beside)
 
     def sound_of(self, start: int, stop: int) -> Sound | None:
@@ -315,6 +322,13 @@ class MeshSequence:
         """Return the sequence at another frame rate."""
         kept = tuple(note for note in self.notes if note != ASSUMED_FPS)
         return self._derived(self.positions, self._exact, fps=fps, notes=kept)
+
+    def with_looks(
+        self, materials: tuple[Material, ...], images: tuple[Image, ...], parts: tuple[Part, ...] | None = None
+    ) -> MeshSequence:
+        """Return the sequence with other materials and images, and with other parts if they are given."""
+        shown = self.parts if parts is None else parts
+        return self._derived(self.positions, self._exact, materials=materials, images=images, parts=shown)
 
     def with_sound(self, sound: Sound | None, notes: tuple[str, ...] = ()) -> MeshSequence:
         """Return the sequence with another sound or none, and more notes."""

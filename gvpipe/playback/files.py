@@ -37,6 +37,7 @@ def read(
     real_time: bool = False,
     warp: str | None = None,
     volume: bool | None = False,
+    texture: StrPath | None = None,
 ) -> MeshSequence:
     """Read a mesh sequence, or a geometry video as one.
 
@@ -53,6 +54,8 @@ def read(
         warp: a field of displacements that moves the vertices, ``"NAME"`` or ``"NAME:SCALE"``.
         volume: whether what lies inside of a simulation's surface is read, too: volume cells, inner points, and their numbers.
             None: where there is something.
+        texture: a picture for each frame, in place of the texture of the base colour: a folder, a glob or a pattern of
+            pictures, or a video.
 
     Raises:
         InputError, FormatError: the path or what it holds cannot be used.
@@ -62,11 +65,52 @@ def read(
     sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, bool(volume))
     if volume is None and has_inside(sequence):
         sequence = _read(path, fps, clip, mesh, frames, unlimited, real_time, True)
+    if texture is not None:
+        sequence = add_texture(sequence, texture, frames)
     if warp is None:
         return sequence
     from gvpipe.model.warp import warped
 
     return warped(sequence, warp)
+
+
+def add_texture(sequence: MeshSequence, texture: StrPath, frames: tuple[int, int | None] | None = None) -> MeshSequence:
+    """Return a sequence with the pictures of a folder, a pattern or a video as its base colour, one for each frame.
+
+    Args:
+        sequence: with texture coordinates.
+        texture: names the pictures.
+        frames: those of a longer film that the sequence has.
+
+    Raises:
+        InputError: the pictures cannot be used, or there are no texture coordinates.
+    """
+    from gvpipe.io.picture_rows import open_pictures
+    from gvpipe.model.moving_texture import with_pictures
+
+    pictures = open_pictures(check_path(texture, "the texture"), len(sequence), frames)
+    return with_pictures(sequence, pictures, _texture_name(texture))
+
+
+def add_texture_to_shots(capture: Capture, texture: StrPath, frames: tuple[int, int | None] | None = None) -> Capture:
+    """Return a capture whose shots have the pictures of their frames; the rest is as of `add_texture`."""
+    from gvpipe.asset.moving import SomePictures
+    from gvpipe.io.picture_rows import open_pictures
+    from gvpipe.model.capture import Capture
+    from gvpipe.model.moving_texture import with_pictures
+
+    pictures = open_pictures(check_path(texture, "the texture"), len(capture), frames)
+    name, starts = _texture_name(texture), capture.starts
+    shots = [
+        with_pictures(shot, SomePictures(pictures, start, start + len(shot)), name)
+        for shot, start in zip(capture.shots, starts, strict=True)
+    ]
+    return Capture(shots, capture.name, sound=capture.sound)
+
+
+def _texture_name(texture: StrPath) -> str:
+    """What an image is called: the name of its files without numbers."""
+    return Path(os.fspath(texture)).stem.rstrip("_-. %0d#*") or "texture"
 
 
 def has_inside(sequence: MeshSequence) -> bool:

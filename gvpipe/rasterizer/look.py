@@ -9,12 +9,14 @@ import numpy as np
 
 from gvpipe.asset.attribute import Attribute
 from gvpipe.asset.material import WRAPS, Image, Material, Texture
+from gvpipe.asset.moving import Pictures
 from gvpipe.asset.part import Part
+from gvpipe.asset.placement import from_upper_left
 from gvpipe.foundation.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from gvpipe.rasterizer.alpha_ranges import reach_alpha
 from gvpipe.rasterizer.colours import to_linear
 from gvpipe.rasterizer.scene import BLENDED, CLAY, CULLED, NO_LOOK, ROLES, TESTED, UNLIT, Look
-from gvpipe.rasterizer.textures import decode_image, largest_side, pack
+from gvpipe.rasterizer.textures import MovingTexels, decode_image, largest_side, pack
 
 SRGB_ROLES = ("base_color_texture", "emissive_texture")  # the others hold numbers
 INVISIBLE = 1 / 512  # alpha of what is see-through but left out
@@ -48,15 +50,15 @@ class Asset(Protocol):
     def read(self, start: int, stop: int) -> Float32: ...
 
 
-def look_of(asset: Asset) -> tuple[Look, tuple[str, ...]]:
-    """Return the look of an asset, that of none if it has neither materials nor colours, and notes on images left out.
+def look_of(asset: Asset) -> tuple[Look, tuple[str, ...], MovingTexels]:
+    """Return an asset's look (that of none without materials and colours), notes on images left out, and what moves.
 
     Raises:
         InputError: a texture's uv attribute is missing, or is none of vertices or corners.
     """
     colours = _corner_colours(asset)
     if not asset.materials and not len(colours):
-        return NO_LOOK, ()
+        return NO_LOOK, (), MovingTexels(NO_LOOK.texels, {}, 1)
     materials = [*asset.materials, BARE]
     of_triangles = np.full(len(asset.faces), len(materials) - 1, np.int32)
     for part in asset.parts:
@@ -79,7 +81,8 @@ def look_of(asset: Asset) -> tuple[Look, tuple[str, ...]]:
             twins.append(m)
     slots = np.concatenate([slots, slots[twins]])
     base = np.clip([material.base_color for material in materials], 0, 1)
-    return Look(
+    texels = pack(textures.pixels, textures.is_srgb)
+    look = Look(
         of_triangles=of_triangles,
         flags=np.array(flags, np.int32),
         cutoffs=np.array([each.alpha_cutoff if each.alpha_mode == "mask" else INVISIBLE for each in materials], float),
@@ -93,8 +96,9 @@ def look_of(asset: Asset) -> tuple[Look, tuple[str, ...]]:
         scales=np.array(textures.scales, float),
         uv=textures.coordinates(),
         colours=colours,
-        texels=pack(textures.pixels, textures.is_srgb),
-    ), tuple(textures.notes)
+        texels=texels,
+    )
+    return look, tuple(textures.notes), MovingTexels(texels, textures.moving, textures.side)
 
 
 def see_through(look: Look) -> tuple[Int32, Int32]:
@@ -121,7 +125,7 @@ class _Textures:
 
     def __init__(self, asset: Asset, of_triangles: Int32) -> None:
         self._asset, self._count = asset, len(of_triangles)
-        self._side = largest_side(asset.images)
+        self.side = largest_side(asset.images)
         self._images: dict[tuple[int, bool], int | None] = {}
         self._decoded: dict[int, Array | None] = {}
         self._uv: list[Float32] = []
@@ -132,6 +136,7 @@ class _Textures:
         self.scales: list[float] = []
         self.pixels: list[Array] = []
         self.is_srgb: list[bool] = []
+        self.moving: dict[int, tuple[Pictures, bool]] = {}
         self.notes: list[str] = []
 
     def add(self, number: int, material: Material) -> list[int]:
@@ -196,11 +201,14 @@ class _Textures:
             if pixels is not None:
                 self.pixels.append(pixels)
                 self.is_srgb.append(is_srgb)
+                pictures = self._asset.images[number].pictures
+                if pictures is not None:
+                    self.moving[len(self.pixels) - 1] = pictures, is_srgb
         return self._images[key]
 
     def _decode(self, number: int) -> Array | None:
         image = self._asset.images[number]
-        decoded = decode_image(image, self._side)
+        decoded = decode_image(image, self.side)
         if isinstance(decoded, str):
             self.notes.append(f"image {image.name!r} {decoded}; its materials are drawn without it")
             return None
@@ -213,11 +221,7 @@ class _Textures:
         if row == len(self._uv):
             self._uv.append(np.zeros((self._count, 3, 2), np.float32))
         chosen = self.triangles_of(material)
-        uv = self._corners[texture.uv][chosen].astype(np.float64) * (1, -1) + (0, 1)
-        with np.errstate(over="ignore", invalid="ignore"):
-            cos, sin = np.cos(texture.rotation), np.sin(texture.rotation)
-            u, v = uv[..., 0] * texture.tiling[0], uv[..., 1] * texture.tiling[1]
-            moved = np.stack([cos * u + sin * v, cos * v - sin * u], axis=-1) + texture.offset
+        moved = from_upper_left(texture, self._corners[texture.uv][chosen])
         self._uv[row][chosen] = np.clip(np.nan_to_num(moved), -FARTHEST_UV, FARTHEST_UV)
 
 

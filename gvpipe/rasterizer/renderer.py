@@ -20,13 +20,14 @@ from itertools import pairwise
 import numpy as np
 
 from gvpipe.foundation.arrays import Float32, Floats, Int32, UInt8
-from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.errors import GvpipeError, InputError
 from gvpipe.rasterizer.camera import Camera
 from gvpipe.rasterizer.colormaps import colormap
 from gvpipe.rasterizer.colours import BACK, BACKGROUND, FRONT, HOLE, srgb_codes, to_linear
 from gvpipe.rasterizer.corner_normals import shared_normals
 from gvpipe.rasterizer.look import Asset, look_of, see_through
 from gvpipe.rasterizer.scene import NO_LOOK, Look, Paint, Projection, Scene, View, ZBuffer
+from gvpipe.rasterizer.textures import MovingTexels
 from gvpipe.runtime.forks import renew_after_fork
 
 SHADINGS = ("smooth", "flat")
@@ -78,6 +79,7 @@ class Renderer:
         self._face_normals = np.zeros((len(faces), 3))
         self._set_normals(*(shared_normals(self._faces, base, None) if self._smooth else (self._faces, 0)))
         self._set_look(NO_LOOK)
+        self._moving: MovingTexels | None = None
         self._paint = Paint(
             front=to_linear(FRONT),
             back=to_linear(BACK),
@@ -126,20 +128,23 @@ class Renderer:
         if painter._smooth and given is not None:
             painter._set_normals(*shared_normals(painter._faces, base, given))
         if not plain:
-            look, painter.notes = look_of(asset)
+            look, painter.notes, painter._moving = look_of(asset)
             painter._set_look(look)
         return painter
 
-    def draw(self, positions: Float32, camera: Camera, values: Floats | None = None) -> UInt8:
+    def draw(self, positions: Float32, camera: Camera, values: Floats | None = None, frame: int = 0) -> UInt8:
         """Return the picture ``(height, width, 3) uint8``, sRGB.
 
         Args:
             positions: ``(V, 3)``, model units.
             values: ``(V,)``, or ``(T, 1)`` for triangles, in 0..1: shown as colours instead of materials; NaN is grey.
+            frame: whose pictures moving images show. A picture that cannot be decoded leaves that before, and a note.
         """
         from gvpipe.rasterizer.shading_kernels import shade
 
         look, paint, scene = self._look, self._paint, self._scene(positions, camera)
+        if self._moving is not None and values is None:
+            self._show(self._moving, frame)
         if values is not None:
             look, paint = NO_LOOK, self._paint_of(values)
         width, height = self.size
@@ -151,6 +156,12 @@ class Renderer:
 
         self._in_bands(paint_band)
         return picture
+
+    def _show(self, moving: MovingTexels, frame: int) -> None:
+        try:
+            moving.show(frame)
+        except GvpipeError as exc:
+            self.notes = tuple(dict.fromkeys([*self.notes, f"a picture before it is drawn: {exc}"]))
 
     def visible(self, positions: Float32, camera: Camera) -> Int32:
         """Return the nearest triangle that each sample sees, -1 for none: ``(height * samples, width * samples) int32``."""

@@ -14,8 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.asset.material import Image, image_size
+from gvpipe.asset.material import Image
+from gvpipe.asset.moving import Pictures
 from gvpipe.foundation.arrays import Array, Float32, Int32, Int64
+from gvpipe.foundation.errors import GvpipeError
 from gvpipe.rasterizer.colours import to_linear
 
 MAX_PIXELS = 1 << 26  # of an image that is decoded, and of all texels: 8192 x 8192
@@ -43,7 +45,7 @@ NO_TEXELS = Texels(np.zeros((0, 4), np.uint16), np.zeros((0, MAX_LEVELS, 3), np.
 
 def largest_side(images: Iterable[Image]) -> int:
     """The side, texels, that images are halved to, so that all of them together have at most `MAX_PIXELS`."""
-    sizes = [image_size(image.data) or (1, 1) for image in images]
+    sizes = [image.size or (1, 1) for image in images]
     side = MAX_SIDE
     while side > 1 and sum(w * h * min(1.0, side / max(w, h)) ** 2 for w, h in sizes) > MAX_PIXELS:
         side //= 2
@@ -51,9 +53,17 @@ def largest_side(images: Iterable[Image]) -> int:
 
 
 def decode_image(image: Image, side: int = MAX_SIDE) -> Array | str:
-    """Return pixels ``(h, w, 4) uint8`` or ``uint16``, RGBA, at most ``side`` along an axis, or a text: why not."""
+    """Return pixels ``(h, w, 4) uint8`` or ``uint16``, RGBA, at most ``side`` along an axis, or a text: why not.
+
+    Of a moving image these are those of frame 0.
+    """
     from PIL import Image as Pillow
 
+    if image.pictures is not None:
+        try:
+            return decode_frame(image.pictures, 0, side)
+        except GvpipeError as exc:
+            return f"cannot be decoded ({exc})"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of large pictures, whose pixels are counted instead
@@ -68,6 +78,37 @@ def decode_image(image: Image, side: int = MAX_SIDE) -> Array | str:
             return _halved_to_fit(np.asarray(opened.convert("RGBA")), side)
     except Exception:  # damaged files raise nearly anything inside Pillow
         return f"({image.media_type}) cannot be decoded"
+
+
+def decode_frame(pictures: Pictures, frame: int, side: int = MAX_SIDE) -> Array:
+    """The same of a frame's picture; raises as `Pictures.pixels`."""
+    pixels = pictures.pixels(frame)
+    opaque = np.full((*pixels.shape[:2], 1), np.iinfo(pixels.dtype).max, pixels.dtype)
+    return _halved_to_fit(np.concatenate([pixels, opaque], axis=2), side)
+
+
+class MovingTexels:
+    """Texels of moving images, changed in place from frame to frame.
+
+    Args:
+        texels: of all images, those of frame 0.
+        moving: pictures of those that move, by their number in ``texels``, and whether they are sRGB.
+        side: largest side, texels.
+    """
+
+    def __init__(self, texels: Texels, moving: dict[int, tuple[Pictures, bool]], side: int) -> None:
+        self._texels, self._moving, self._side = texels, moving, side
+        self._frame = 0
+
+    def show(self, frame: int) -> None:
+        """Have the texels of a frame; raises as `Pictures.pixels`."""
+        if frame == self._frame or not self._moving:
+            return
+        for number, (pictures, is_srgb) in self._moving.items():
+            packed = pack([decode_frame(pictures, frame, self._side)], [is_srgb])
+            start = int(self._texels.levels[number, 0, 0])
+            self._texels.numbers[start : start + len(packed.numbers)] = packed.numbers
+        self._frame = frame
 
 
 def pack(pixels: list[Array], is_srgb: list[bool]) -> Texels:

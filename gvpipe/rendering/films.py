@@ -119,7 +119,7 @@ class Film:
             picture = self.cut.draw(frame, camera)
         else:
             values = self.shown.values(frame) if self.shown else None
-            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], camera, values)
+            picture = self.renderer.draw(self.sequence.read(frame, frame + 1)[0], camera, values, frame)
         if self.legend is None:
             return picture
         legend = self.legend

@@ -49,9 +49,9 @@ def test_turntable_ends_one_step_before_its_start(monkeypatch: pytest.MonkeyPatc
     azimuths: list[float] = []
     draw = Renderer.draw
 
-    def noted(self: Renderer, positions: Any, camera: Camera, values: Any = None) -> Any:
+    def noted(self: Renderer, positions: Any, camera: Camera, values: Any = None, frame: int = 0) -> Any:
         azimuths.append(camera.azimuth)
-        return draw(self, positions, camera, values)
+        return draw(self, positions, camera, values, frame)
 
     monkeypatch.setattr(Renderer, "draw", noted)
     sequence = waving(6, 10)

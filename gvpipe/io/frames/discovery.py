@@ -15,7 +15,7 @@ import itertools
 import os
 import re
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
 
 from gvpipe.foundation import notes
@@ -26,6 +26,7 @@ from gvpipe.io.frames.pattern import Pattern, match_pattern
 from gvpipe.io.scene_formats import SCENE_SUFFIXES
 
 GLOB_CHARACTERS = "*?["
+Choose = Callable[[Sequence[Path], str], list[Path]]
 LISTED = 3  # gaps, series and names spelt out in a message before it says "and more"
 
 
@@ -35,19 +36,36 @@ def find_frames(path: str) -> list[Path]:
     Raises:
         InputError: nothing found, several formats or series, two files with one number, gaps in the numbering.
     """
+    return _find(path, _of_one_format)
+
+
+def find_files(path: str, suffixes: Sequence[str], noun: str) -> list[Path]:
+    """The same of other files, by their suffixes; ``noun`` says what they are."""
+
+    def choose(files: Sequence[Path], where: str) -> list[Path]:
+        found = [file for file in files if file.suffix.lower() in suffixes]
+        if not found:
+            raise InputError(f"{where}: no {noun} is there; {noun}s may be {', '.join(suffixes)}")
+        return found
+
+    return _find(path, choose)
+
+
+def _find(path: str, choose: Choose) -> list[Path]:
+    """Files in frame order; ``choose`` returns those that count of what is found, or refuses them."""
     if os.path.isdir(path):
-        return _order(_of_one_format(_list_folder(Path(path)), path), path)
+        return _order(choose(_list_folder(Path(path)), path), path)
     if os.path.exists(path):
-        return _of_one_format([Path(path)], path)
+        return choose([Path(path)], path)
     pattern = match_pattern(path)
     if pattern is not None:
-        return _find_pattern(Path(path), pattern)
+        return _find_pattern(Path(path), pattern, choose)
     if any(character in path for character in GLOB_CHARACTERS):
         matches = [Path(match) for match in glob.glob(path, recursive=True)]
         files = [match for match in matches if match.is_file()]
         if not files:
             raise InputError(f"{path}: no file matches; check the path and put it in quotes")
-        return _order(_of_one_format(files, path), path)
+        return _order(choose(files, path), path)
     raise InputError(f"{path}: no such file or folder; check the path")
 
 
@@ -113,7 +131,7 @@ def _of_one_format(files: Sequence[Path], path: str) -> list[Path]:
     return meshes
 
 
-def _find_pattern(path: Path, pattern: Pattern) -> list[Path]:
+def _find_pattern(path: Path, pattern: Pattern, choose: Choose) -> list[Path]:
     folder = path.parent
     if not folder.is_dir():
         raise InputError(f"{path}: no folder {folder}; check the path")
@@ -125,7 +143,7 @@ def _find_pattern(path: Path, pattern: Pattern) -> list[Path]:
     if not by_number:
         raise InputError(f"{path}: no file such as {pattern.name(1)}; check the path and the number of digits")
     numbers = sorted(by_number)
-    files = _of_one_format([by_number[number] for number in numbers], str(path))
+    files = choose([by_number[number] for number in numbers], str(path))
     _check_gaps(files, numbers, [pattern.name(number)[len(pattern.before) :][: pattern.width] for number in numbers])
     return files
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,27 +20,46 @@ from gvpipe.io.frames.frame_files import load_mesh
 from gvpipe.io.left_behind import met_later
 from gvpipe.io.mesh import Mesh
 
+if TYPE_CHECKING:
+    from gvpipe.io.obj.moving import Moving
+
 HAVE_LOOKS = (".obj", ".ply", ".gltf", ".glb")
 SAMPLES = 3  # files that are compared with the first
 CHANGES = "materials and textures of later frames"
 
 
-def changing_looks(first: Mesh, files: Sequence[Path]) -> tuple[str, ...]:
+def moving_looks(first: Mesh, files: Sequence[Path], start: int) -> Moving | None:
+    """Images that each frame has a picture of its own for (`gvpipe.io.obj.moving`); None where there are none.
+
+    Raises:
+        InputError: a picture has another size than the first.
+    """
+    if files[0].suffix.lower() != ".obj" or not first.images or any(map(is_elsewhere, files)):
+        return None
+    from gvpipe.io.obj.moving import moving_images
+
+    return moving_images(files, first.materials, first.images, start)
+
+
+def changing_looks(first: Mesh, files: Sequence[Path], is_moving: bool = False) -> tuple[str, ...]:
     """What is not carried of later frames, by name; files that cannot be read are passed over, since their readers say so.
 
     Args:
         first: the first file.
         files: all, in frame order.
+        is_moving: whether materials and pictures of later frames are known, and carried.
     """
     suffix = files[0].suffix.lower()
     if suffix not in HAVE_LOOKS or len(files) < 2:
         return ()
-    found = dict.fromkeys(_changing_files(files)) if suffix == ".obj" else {}
+    found = dict.fromkeys(_changing_files(files)) if suffix == ".obj" and not is_moving else {}
     for number in np.unique(np.linspace(1, len(files) - 1, SAMPLES).astype(int)).tolist():
         if is_elsewhere(files[number]):
             continue
         with contextlib.suppress(InputError):
             found |= dict.fromkeys(_compared(first, load_mesh(FRAME_FORMATS[suffix].loader(), files[number], number)))
+    if is_moving:
+        found.pop(CHANGES, None)
     return tuple(found)
 
 

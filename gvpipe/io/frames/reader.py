@@ -12,7 +12,7 @@ from gvpipe.io.formats import FRAME_FORMATS, VOLUMES
 from gvpipe.io.frames.columns import split_columns
 from gvpipe.io.frames.discovery import find_frames, order_list, sibling_note
 from gvpipe.io.frames.frame_files import FrameFiles
-from gvpipe.io.frames.later_looks import changing_looks
+from gvpipe.io.frames.later_looks import changing_looks, moving_looks
 from gvpipe.io.late import late
 from gvpipe.io.options import ReadOptions
 from gvpipe.model.sequence import MeshSequence
@@ -39,7 +39,8 @@ def read_frames(path: str | Sequence[str], options: ReadOptions) -> MeshSequence
     frames = FrameFiles(files[first_file:stop], first_file, options.memory is not None)
     first = frames.first
     columns = split_columns(frames)
-    later = changing_looks(first, frames.paths)
+    moving = None if options.memory is not None else moving_looks(first, frames.paths, first_file)
+    later = changing_looks(first, frames.paths, moving is not None)
     frames.forget_animated()
     if fps is None and len(files) > 1:
         noticed = (*noticed, ASSUMED_FPS)
@@ -50,12 +51,12 @@ def read_frames(path: str | Sequence[str], options: ReadOptions) -> MeshSequence
         {**{name: each for name, each in first.attributes.items() if name not in columns.fields}, **columns.attributes},
         name,
         frames.origin,
-        (*noticed, *first.notes, *columns.notes),
+        (*noticed, *first.notes, *columns.notes, *(moving.notes if moving else ())),
         columns.fields,
         first.parts,
         first.polygons,
         first.materials,
-        first.images,
+        moving.images if moving else first.images,
         first.metadata,
         tuple(dict.fromkeys([*first.not_carried, *columns.not_carried, *later])),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from gvpipe.asset.field import Field
@@ -60,7 +60,9 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0, looks: int =
             made.folder()
         for name, data in encoder.beside.items():
             made.file(target.with_name(name), data)
-        _write_each(sequence, encoder, made, lambda frame: target.with_name(pattern.name(start + frame)) if pattern else target)
+        places = [target.with_name(pattern.name(start + frame)) if pattern else target for frame in range(sequence.n_frames)]
+        width = pattern.width if pattern else 0
+        _write_each(sequence, encoder, made, places, [f"{start + frame:0{width}d}" for frame in range(sequence.n_frames)])
     except OutputError as exc:
         whole = made.undo()
         if not whole:
@@ -69,15 +71,23 @@ def write_frames(sequence: MeshSequence, path: str, start: int = 0, looks: int =
     return encoder.notes
 
 
-def _write_each(sequence: MeshSequence, encoder: FrameEncoder, made: _Made, place: Callable[[int], Path]) -> None:
-    """Write all frames."""
+def _write_each(
+    sequence: MeshSequence, encoder: FrameEncoder, made: _Made, places: Sequence[Path], numbers: Sequence[str]
+) -> None:
+    """Write all frames to their places, with what each has of its own beside it, by the number in its name."""
     wanted = {name: sequence.fields[name] for name in encoder.fields}
     for first, stop in _spans(sequence, wanted):
         block = sequence.read(first, stop)
         fields = {name: field.read(first, stop) for name, field in wanted.items()}
         for i, positions in enumerate(block):
+            place, number = places[first + i], numbers[first + i]
             data = encoder.encode(positions, {name: values[i] for name, values in fields.items()})
-            made.file(place(first + i), data)
+            if encoder.of_frame is not None:
+                head, own = encoder.of_frame(first + i, number)
+                data = head + data
+                for name, content in own.items():
+                    made.file(place.with_name(name), content)
+            made.file(place, data)
             made.n_frames += 1
 
 

@@ -18,7 +18,7 @@ HEAD = 1 << 13  # bytes at the top of a frame
 
 def have_changing_materials(files: Sequence[Path]) -> bool:
     """Whether material files of later frames differ from those of the first."""
-    named = [_libraries(path) for path in files] if len(files) > 1 else []
+    named = [libraries_of(path) for path in files] if len(files) > 1 else []
     others = [(path, names) for path, names in zip(files[1:], named[1:], strict=True) if names and names != named[0]]
     if not others:
         return False
@@ -26,7 +26,7 @@ def have_changing_materials(files: Sequence[Path]) -> bool:
     return any(_contents(path, names) != first for path, names in others)
 
 
-def _libraries(path: Path) -> tuple[str, ...]:
+def libraries_of(path: Path) -> tuple[str, ...]:
     """Names of the material files that the top of a frame names."""
     try:
         with open(path, "rb") as file:

@@ -65,6 +65,16 @@ class _Map:
 
 def read_mtl(text: str, pictures: Pictures, names: Collection[str]) -> list[Material]:
     """The materials of these names in the file's order; their pictures, and notes, are added to ``pictures``."""
+    return [_material(name, statements, pictures) for name, statements in _blocks(text) if name in names]
+
+
+def names_in(text: str) -> list[str]:
+    """The names of all materials in the file's order."""
+    return [name for name, _ in _blocks(text)]
+
+
+def _blocks(text: str) -> list[tuple[str, dict[str, str]]]:
+    """Names of materials, and their statements."""
     blocks: list[tuple[str, dict[str, str]]] = []
     for line in text.replace("\\\n", " ").splitlines():
         words = line.strip().split(None, 1)
@@ -75,7 +85,7 @@ def read_mtl(text: str, pictures: Pictures, names: Collection[str]) -> list[Mate
             blocks.append((rest, {}))
         elif blocks:
             blocks[-1][1][ALIASES.get(key, key)] = rest
-    return [_material(name, statements, pictures) for name, statements in blocks if name in names]
+    return blocks
 
 
 def _material(name: str, statements: dict[str, str], pictures: Pictures) -> Material:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,11 +32,12 @@ def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
     uv = uv if uv is not None and uv.kind == "uv" and uv.domain in ("vertex", "corner") else None
     table, vt = (None, None) if uv is None else _indexed(uv, sequence.faces)
     normals = frame_normals(sequence)
+    is_moving = any(image.is_moving for image in sequence.images)
     library, names, beside, lost = _materials(sequence, shared)
     body = b"" if table is None else format_rows("vt %.9g %.9g\n", table).encode("ascii")
     vn = None if normals is None else sequence.faces.reshape(-1) if normals.indices is None else normals.indices
     tail = _faces(sequence, vt, vn, names).encode("utf-8")
-    head = library.encode("utf-8")
+    head = b"" if is_moving else library.encode("utf-8")
     color = _colors(sequence)
     origin = sequence.origin
 
@@ -54,7 +56,9 @@ def encode_obj(sequence: MeshSequence, shared: str) -> FrameEncoder:
     held |= ({"normal"} if normals is not None else set()) | ({"color"} if color is not None else set())
     opaque = color is None or color.shape[1] == 3 or bool((_parts_of_one(color[:, 3:]) == 1).all())
     notes = lost_notes(sequence, "OBJ", held, () if opaque else ("alpha of colours",))
-    return FrameEncoder(encode, tuple(wanted), (*turned_note(normals, "OBJ"), *notes, *not_held("MTL", lost)), beside)
+    said = (*turned_note(normals, "OBJ"), *notes, *not_held("MTL", lost))
+    of_frame = partial(_of_frame, sequence, shared) if is_moving else None
+    return FrameEncoder(encode, tuple(wanted), said, beside, of_frame)
 
 
 def _indexed(each: Attribute, faces: Int32) -> tuple[Array, Int32]:
@@ -81,7 +85,10 @@ def _is_vertex_field(sequence: MeshSequence, name: str) -> bool:
 
 
 def _materials(sequence: MeshSequence, shared: str) -> tuple[str, list[str], dict[str, bytes], list[str]]:
-    """The ``mtllib`` line, the names of materials, all different, the files beside, and what they have no place for."""
+    """The ``mtllib`` line, the names of materials, all different, the files beside, and what they have no place for.
+
+    Where images move, frames have material files of their own, and pictures that stand still alone are beside.
+    """
     if not sequence.materials:
         return "", [], {}, []
     names: list[str] = []
@@ -90,9 +97,24 @@ def _materials(sequence: MeshSequence, shared: str) -> tuple[str, list[str], dic
         names.append(f"{name}_{number}" if name in names else name)
     pictures = picture_names(sequence.images)
     text, lost = write_mtl(sequence.materials, names, pictures)
-    files = {f"{shared}.mtl": text.encode("utf-8")}
-    files |= {name: image.data for name, image in zip(pictures, sequence.images, strict=True)}
+    still = [(name, image) for name, image in zip(pictures, sequence.images, strict=True) if not image.is_moving]
+    files = {f"{shared}.mtl": text.encode("utf-8")} if len(still) == len(pictures) else {}
+    files |= {name: image.data for name, image in still}
     return f"mtllib {shared}.mtl\n", names, files, lost
+
+
+def _of_frame(sequence: MeshSequence, shared: str, frame: int, number: str) -> tuple[bytes, dict[str, bytes]]:
+    """The ``mtllib`` line of a frame, its material file, and its pictures of images that move."""
+    images = [
+        replace(image.frame(frame), name=f"{image.name}_{number}") if image.is_moving else image for image in sequence.images
+    ]
+    pictures = picture_names(images)
+    _, names, _, _ = _materials(sequence, shared)
+    library = f"{shared}_{number}.mtl"
+    files = {library: write_mtl(sequence.materials, names, pictures)[0].encode("utf-8")}
+    moving = zip(pictures, images, sequence.images, strict=True)
+    files |= {name: image.data for name, image, source in moving if source.is_moving}
+    return f"mtllib {library}\n".encode(), files
 
 
 def _faces(sequence: MeshSequence, vt: Int32 | None, vn: Int32 | None, names: Sequence[str]) -> str:

@@ -12,6 +12,12 @@ from gvpipe.model.sequence import MeshSequence
 WRAPS = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
 
 
+def frame_name(name: str, frame: int) -> str:
+    """The file name of a frame of an image that moves, of the image's name."""
+    stem, dot, ending = name.rpartition(".")
+    return f"{stem}_{frame:04d}{dot}{ending}"
+
+
 class MaterialWriter:
     """The materials of a sequence below one prim, each written when it is bound first.
 
@@ -20,11 +26,14 @@ class MaterialWriter:
         sequence: with materials and images.
         scope: path of the prim that holds them.
         folder: of the images, relative to the stage.
-        names: of the images' files.
+        names: of the images' files; of an image that moves, each frame has its own (`frame_name`).
+        start: time code of the first frame.
     """
 
-    def __init__(self, stage: Any, sequence: MeshSequence, scope: str, folder: str, names: list[str]) -> None:
-        self._stage, self._sequence, self._scope = stage, sequence, scope
+    def __init__(
+        self, stage: Any, sequence: MeshSequence, scope: str, folder: str, names: list[str], start: float = 0.0
+    ) -> None:
+        self._stage, self._sequence, self._scope, self._start = stage, sequence, scope, start
         self._files = [f"./{folder}/{name}" for name in names]
         self._written: dict[int, Any] = {}
         self._taken: set[str] = set()
@@ -108,7 +117,11 @@ class MaterialWriter:
         if shader.GetIdAttr().Get():
             return shader
         shader.CreateIdAttr("UsdUVTexture")
-        shader.CreateInput("file", types.Asset).Set(Sdf.AssetPath(self._files[texture.image]))
+        file, given = self._files[texture.image], shader.CreateInput("file", types.Asset)
+        pictures = self._sequence.images[texture.image].pictures
+        given.Set(Sdf.AssetPath(file if pictures is None else frame_name(file, 0)))
+        for frame in range(0 if pictures is None else len(pictures)):
+            given.Set(Sdf.AssetPath(frame_name(file, frame)), self._start + frame)
         shader.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if "Color" in shared else "raw")
         for axis, wrap in zip(("wrapS", "wrapT"), texture.wrap, strict=True):
             shader.CreateInput(axis, types.Token).Set(WRAPS[wrap])

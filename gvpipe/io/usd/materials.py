@@ -7,6 +7,7 @@ metallic-roughness model; they are named as what is not carried.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ class Materials:
     def __init__(self, path: Path, time: float | None = None) -> None:
         self._time = time
         self.textures = Textures(path)
+        self.times: Sequence[float] = ()  # time codes of the frames, for textures that move
         self.materials: list[Material] = []
         self.plain: list[str] = []  # materials without UsdPreviewSurface
         self.left = LeftBehind()
@@ -170,7 +172,8 @@ class Materials:
         wrap = tuple(WRAPS.get(str(_value(shader, axis)), "repeat") for axis in ("wrapS", "wrapT"))
         scale = _value(shader, "scale")
         factors = tuple(float(x) for x in scale) if scale is not None else (1.0, 1.0, 1.0, 1.0)
-        return self.textures.read(_value(shader, "file", self._time), output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
+        assets = _values(shader, "file", self.times, self._time)
+        return self.textures.read(assets, output, replace(place, wrap=wrap), factors)  # type: ignore[arg-type]
 
 
 def _shows_colors(surface: Any, name: str) -> bool:
@@ -223,6 +226,18 @@ def _connected(shader: Any, name: str) -> tuple[Any, str]:
         if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Output:
             return UsdShade.Shader(attribute.GetPrim()), UsdShade.Utils.GetBaseNameAndType(attribute.GetName())[0]
     return None, ""
+
+
+def _values(shader: Any, name: str, times: Sequence[float], time: float | None) -> list[Any]:
+    """The values of an input at some times; one where they are the same, there is none, or one time is asked for."""
+    from pxr import UsdShade
+
+    given = shader.GetInput(name)
+    for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given and time is None else ():
+        is_input = UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Input
+        if is_input and attribute.ValueMightBeTimeVarying() and len(times) > 1:
+            return [attribute.Get(float(each)) for each in times]
+    return [_value(shader, name, time)]
 
 
 def _value(shader: Any, name: str, time: float | None = None) -> Any:

@@ -80,6 +80,7 @@ def _read_stage(stage: Any, path: Path, options: ReadOptions) -> tuple[MeshSeque
     frames.changes_at = None if changes_at is None else first + changes_at
     last = float(times[-1]) if options.memory else None
     materials = Materials(path, None if last is None else float(times[0]))
+    materials.times, materials.textures.first = times.tolist(), first
     found.left.add_all(animated_inputs(stage, None if last is None else (float(times[0]), last)))
     own = [found.meshes[number][0] for number in kept]
     read = [_read_mesh(mesh, motion, materials, (times, where, first), last) for mesh, motion in zip(own, motions, strict=True)]

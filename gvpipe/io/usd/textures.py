@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from gvpipe.asset.material import Image, Texture
+from gvpipe.asset.moving import Pictures
 from gvpipe.foundation.errors import InputError
+from gvpipe.io.picture_files import BytesPictures, FilePictures
 from gvpipe.io.usd.stage import is_inside
 
 MEDIA_TYPES = {
@@ -43,15 +46,20 @@ class Textures:
         self.images: list[Image] = []
         self.notes: list[str] = []
         self._folder = Path(os.path.realpath(path)).parent
-        self._numbers: dict[str, int | None] = {}
+        self.first = 0  # number of the first frame, for messages
+        self._numbers: dict[tuple[str, ...], int | None] = {}
 
-    def read(self, asset: Any, output: str, texture: Texture, scale: tuple[float, ...]) -> Source | None:
-        """Return the texture with its image, or None for a file that is missing, outside of the folder or no picture."""
-        if asset is None or not asset.path:
+    def read(self, assets: Sequence[Any], output: str, texture: Texture, scale: tuple[float, ...]) -> Source | None:
+        """Return the texture with its image, or None for a file that is missing, outside of the folder or no picture.
+
+        Of several assets, one for each frame, the image moves; where a file cannot be read, that of the frame before is shown.
+        """
+        if assets[0] is None or not assets[0].path:
             return None
-        if asset.path not in self._numbers:
-            self._numbers[asset.path] = self._load(asset)
-        number = self._numbers[asset.path]
+        key = tuple("" if asset is None else asset.path for asset in assets)
+        if key not in self._numbers:
+            self._numbers[key] = self._load(assets[0]) if len(set(key)) == 1 else self._load_row(assets)
+        number = self._numbers[key]
         return None if number is None else Source(replace(texture, image=number), output, scale)
 
     def combine(self, metallic: Source | None, roughness: Source | None) -> Texture | None:
@@ -92,6 +100,34 @@ class Textures:
             return None
         self.images.append(image)
         return len(self.images) - 1
+
+    def _load_row(self, assets: Sequence[Any]) -> int | None:
+        """An image with a picture for each frame; None, and a note, if the first cannot be used."""
+        first = self._load(assets[0])
+        if first is None:
+            return None
+        files = [(self.images[first].media_type, self.images[first].data)]
+        paths, known = [Path(assets[0].resolvedPath)], {assets[0].path: 0}
+        for frame, asset in enumerate(assets[1:], 1):
+            path = "" if asset is None else asset.path
+            if path not in known:
+                data, reason = (None, "is not named") if asset is None else self._bytes(asset)
+                if data is None:
+                    self.notes.append(
+                        f"texture {path} of frame {self.first + frame} {reason}; that of the frame before is shown"
+                    )
+                known[path] = frame if data is not None else frame - 1
+                files.append(files[-1] if data is None else (MEDIA_TYPES.get(Path(path).suffix.lower(), ""), data))
+                paths.append(paths[-1] if data is None else Path(asset.resolvedPath))
+            else:
+                files.append(files[known[path]])
+                paths.append(paths[known[path]])
+        if len({data for _, data in files}) == 1:
+            return first
+        is_packed = any(not path.is_file() for path in paths)
+        row: Pictures = BytesPictures(files, self.first) if is_packed else FilePictures(paths, self.first)
+        self.images[first] = replace(self.images[first], data=b"", pictures=row)
+        return first
 
     def _bytes(self, asset: Any) -> tuple[bytes | None, str]:
         from pxr import Ar

@@ -23,7 +23,7 @@ from gvpipe.io.damage import reason_of
 from gvpipe.io.losses import NO_PARENTS, TURNED_NORMALS, renamed_note, shadow_note, shadowed, unit_note, wide_note
 from gvpipe.io.scene.export import ExportMesh, export_meshes, uncovered
 from gvpipe.io.scene.normals import SceneNormals
-from gvpipe.io.usd.material_writer import MaterialWriter
+from gvpipe.io.usd.material_writer import MaterialWriter, frame_name
 from gvpipe.io.usd.names import ADDED, identifier, name_prim
 from gvpipe.io.usd.primvar_writer import primvar_names, write_field, write_normals, write_primvars
 from gvpipe.io.usd.signature import EXTRA
@@ -96,7 +96,7 @@ def _write_package(make: StageMaker, images: Mapping[str, Image], path: Path) ->
             package = folder / "package.usdz"
             writer = zip_writer.CreateNew(str(package))
             writer.AddFile(str(stage), f"{identifier(path.stem)}.usdc")
-            for name in images:
+            for name in _files_of(images):
                 writer.AddFile(str(folder / "textures" / name), f"textures/{name}")
             writer.Save()
             del writer
@@ -136,7 +136,7 @@ def write_stage(
     stage.SetDefaultPrim(top)
     if any(path.count("/") > len(mesh.parent.split("/")) + bool(mesh.parent) for path, mesh in zip(paths, meshes, strict=True)):
         top.SetCustomDataByKey(ADDED, True)
-    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, list(pictures))
+    materials = MaterialWriter(stage, sequence, f"/{root}/Materials", textures, list(pictures), start)
     normals = SceneNormals(sequence, "USD")
     attributes = {name: each for name, each in normals.attributes.items() if name not in normals.fields}
     names = primvar_names({**attributes, **normals.fields})
@@ -297,7 +297,7 @@ def image_names(sequence: MeshSequence) -> list[str]:
     result: list[str] = []
     for number, image in enumerate(sequence.images):
         plain = Path(os.path.basename(image.name.replace("\\", "/")) or f"image{number}")
-        ending = endings.get(image.media_type, plain.suffix)
+        ending = endings.get(image.frame(0).media_type, plain.suffix)
         stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in plain.stem) or f"image{number}"
         name, count = f"{stem}{ending}", 1
         while name in result:
@@ -313,9 +313,20 @@ def _write_images(images: Mapping[str, Image], folder: Path) -> None:
         folder.mkdir(exist_ok=True)
     except OSError as exc:
         raise OutputError(f"cannot write {folder}: {exc.strerror}; choose another folder") from exc
-    for name, image in images.items():
+    for name, (image, frame) in _files_of(images).items():
         with unnamed_path(folder / name) as temporary:
-            temporary.write_bytes(image.data)
+            temporary.write_bytes(image.frame(frame).data)
+
+
+def _files_of(images: Mapping[str, Image]) -> dict[str, tuple[Image, int]]:
+    """The files of images by name, each with its image and frame: one, or one for each frame of an image that moves."""
+    files = {}
+    for name, image in images.items():
+        if image.pictures is None:
+            files[name] = (image, 0)
+        else:
+            files |= {frame_name(name, frame): (image, frame) for frame in range(len(image.pictures))}
+    return files
 
 
 def _notes(sequence: MeshSequence, meshes: list[ExportMesh], has_skin: bool) -> tuple[str, ...]:

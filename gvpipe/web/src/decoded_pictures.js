@@ -107,6 +107,8 @@ export class DecodedPictures {
     this.current = null;
     this.decoder = decoder;
     this.finish = finish;
+    /** Of a frame, what must be here before it is shown. @type {((frame: number) => Promise<unknown>)|null} */
+    this.beside = null;
     this.failure = null; // an error: what was to be decoded ahead is not tried until something is asked for
     this.finishing = 0; // pictures
     this.finished = new Map(); // picture -> Finished, the one asked for last at the end
@@ -255,12 +257,14 @@ export class DecodedPictures {
 
   /** What is shown of a frame's picture; where that is still to be made of its levels, it is under way. @returns {Finished} */
   #finished(frame, levels) {
-    if (!this.finish) return { contents: levels };
+    if (!this.finish && !this.beside) return { contents: levels };
     const picture = this.repeated.distinctOf(frame);
-    let finished = this.finished.get(picture);
-    this.finished.delete(picture);
+    const key = this.#keyOf(frame);
+    let finished = this.finished.get(key);
+    this.finished.delete(key);
     if (!finished) {
-      finished = new Finished(frame, this.finish(picture, levels));
+      const both = Promise.all([this.finish ? this.finish(picture, levels) : levels, this.beside?.(frame)]);
+      finished = new Finished(frame, both.then(([contents]) => contents));
       this.finishing++;
       finished.done.then(() => this.finishing--);
     }
@@ -268,15 +272,20 @@ export class DecodedPictures {
       const done = [...this.finished].find(([, { contents, error }]) => contents || error);
       this.finished.delete(done ? done[0] : this.finished.keys().next().value);
     }
-    this.finished.set(picture, finished);
+    this.finished.set(key, finished);
     return finished;
+  }
+
+  /** What is finished once: a picture, or a frame where something lies beside it. */
+  #keyOf(frame) {
+    return this.beside ? frame : this.repeated.distinctOf(frame);
   }
 
   /** The same while it plays: null where its levels are not there, or too many are under way. @returns {Finished|null} */
   #finishSoon(frame) {
     const picture = this.repeated.distinctOf(frame);
     const levels = this.kept.get(this.groupOf[picture])?.levels.get(picture);
-    const isKnown = !this.finish || this.finished.has(picture);
+    const isKnown = !(this.finish || this.beside) || this.finished.has(this.#keyOf(frame));
     return levels && (isKnown || this.finishing < FINISHING) ? this.#finished(frame, levels) : null;
   }
 

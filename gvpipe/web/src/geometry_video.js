@@ -9,7 +9,8 @@
 import { NO_ASSET, readAsset, readCoarseAsset } from "./asset/asset.js";
 import { openCodec } from "./codecs.js";
 import { findIndex, readContainer } from "./format/boxes.js";
-import { describedSound, geometryOf, soundOf } from "./format/companions.js";
+import { placesInFile, readCompanions } from "./format/companion_parts.js";
+import { describedIn, describedSound, geometryOf, soundOf } from "./format/companions.js";
 import { GeometryVideoError } from "./format/errors.js";
 import { RepeatedFrames, readRepeatedFrames } from "./format/repeated_frames.js";
 import { readPayload } from "./format/payload.js";
@@ -19,6 +20,7 @@ import { OUTAGE, closed, request } from "./format/request.js";
 import { readShots } from "./format/shot_layout.js";
 import { StreamFile } from "./format/stream_file.js";
 import { DecodingWorker } from "./frames/decoding_worker.js";
+import { MovingImages } from "./moving/moving_images.js";
 import { checkRate } from "./playback_rate.js";
 import { ShotRow } from "./shots/shot_row.js";
 import { kernelCode } from "./wasm/inflated.js";
@@ -88,6 +90,8 @@ export class GeometryVideo {
       closing.signal.throwIfAborted();
       const payload = await readPayload(file ? readContainer(file) : parts.container, find);
       const repeated = readRepeatedFrames(payload);
+      const described = describedIn(payload.header);
+      const companions = file ? companionsOf(file, described) : parts.companions(described);
       reader = await openCodec(file ? geometryOf(file) : source, payload, repeated, level, closing.signal, shared);
       const start = file ? 0 : parts.startFrame;
       if (parts?.isGrowing) repeated.grow(parts.live.frames, parts.live.clip);
@@ -99,6 +103,7 @@ export class GeometryVideo {
       video.#isInParts = !file;
       video.#closeFile = () => closing.abort(closed());
       video.#payload = payload;
+      video.#companions = companions;
       if (!find) video.#findSound(file, address, payload.header);
       video.#takeAsset(reader.level ? await readCoarseAsset(payload) : await video.#readAsset(video, reader));
       if (parts?.isGrowing) video.#watch(parts);
@@ -160,6 +165,9 @@ export class GeometryVideo {
   #payload;
   #row = null; // ShotRow, of a capture
   #isOfShot = false; // whether a shot was taken
+  #companions = []; // tracks beside the geometry's
+  #moving = null; // MovingImages, once they are asked for
+  #opening = null; // a promise of them
   #repeated;
   #reader;
   #pictures;
@@ -286,7 +294,7 @@ export class GeometryVideo {
     return this.#queued(async () => {
       this.pause();
       this.#row?.aim(k);
-      await this.#pictures.seek(k);
+      await Promise.all([this.#pictures.seek(k), this.#besideOf(k)]);
       return this.#read(k, positions);
     });
   }
@@ -349,6 +357,38 @@ export class GeometryVideo {
     this.#pictures.pause();
   }
 
+  /**
+   * Have the pictures of images that move from now on: no frame is given before its pictures are here.
+   *
+   * @param {Iterable<number>} wanted numbers of images, of the first call
+   * @returns {Promise<MovingImages>} `show(k)` gives those of the frame that was given last
+   */
+  openMoving(wanted) {
+    if (this.#row) return this.#pictures.current.video.openMoving(wanted); // of the shot that is shown
+    this.#opening ??= this.#openMoving(wanted);
+    return this.#opening;
+  }
+
+  async #openMoving(wanted) {
+    const { header, budget } = this.#payload;
+    const moving = await MovingImages.open(this.images, wanted, this.#companions, header, budget);
+    if (this.#isClosed) moving.close();
+    this.#moving = moving;
+    await this.#queued(() => moving.ready(this.#shown));
+    this.#waitBeside();
+    return moving;
+  }
+
+  /** That all pictures beside a frame are here. */
+  #besideOf(k) {
+    return this.level === 0 ? this.#moving?.ready(k) : undefined;
+  }
+
+  /** Clocks show no frame before what lies beside it is here. */
+  #waitBeside() {
+    this.#pictures.beside = this.#moving?.isEmpty === false && this.level === 0 ? (k) => this.#moving.ready(k) : null;
+  }
+
   /** Free the video; the object is of no use afterwards. */
   close() {
     this.#isClosed = true;
@@ -356,6 +396,7 @@ export class GeometryVideo {
     this.#pictures.close();
     this.#beside?.then((pictures) => pictures.close()).catch(() => {});
     this.#asset?.close();
+    this.#moving?.close();
     this.#reader.close();
     this.#closeFile();
     if (this.#soundUrl) URL.revokeObjectURL(this.#soundUrl);
@@ -414,6 +455,7 @@ export class GeometryVideo {
     /** `Int32Array` (V, 3): the first frame on the file's lattice, if it has one; vertices with equal rows are one point of the surface. */
     this.basePoints = reader.basePoints;
     this.#takeAsset(asset);
+    this.#waitBeside();
   }
 
   /** The whole mesh, which `reader` reads, as `readAsset` needs it while another level is shown. */
@@ -456,7 +498,7 @@ export class GeometryVideo {
     /** `Map` by name of `CodedField`s: `frame(k)` is a promise of an array (R, C) of the field's `type`. */
     this.fields = asset.fields;
     this.materials = asset.materials;
-    /** `{name, mediaType, data}` */
+    /** `{name, mediaType, data}`; data is null of those that move (`openMoving`). */
     this.images = asset.images;
     /** (P) corners of each polygon, or null if all are triangles. */
     this.polygons = asset.polygons;
@@ -522,6 +564,12 @@ export class GeometryVideo {
     this.basePoints = video.basePoints;
     this.#takeAsset(video);
   }
+}
+
+/** Tracks beside the geometry's of a file that is here. */
+function companionsOf(file, described) {
+  const read = async (offset, length) => file.subarray(offset, offset + length);
+  return described.length ? readCompanions(described, file, placesInFile(file, described.length), read) : [];
 }
 
 /** @throws {TypeError} it is nothing that can be loaded */

@@ -10,6 +10,15 @@ import { AGAIN, GeometryVideoError } from "./format/errors.js";
 import { readFragmentSamples } from "./fragments.js";
 
 const CONTAINERS = ["moov", "trak", "mdia", "minf", "stbl"];
+const hex = (byte) => byte.toString(16).padStart(2, "0");
+const two = (number) => String(number).padStart(2, "0");
+const CODECS = { // by the kind of a sample's description: its box, least bytes, and what WebCodecs calls it
+  avc1: { box: "avcC", bytes: 7, isDescribed: true, name: (data) => `avc1.${[...data.subarray(1, 4)].map(hex).join("")}` },
+  hvc1: { box: "hvcC", bytes: 23, isDescribed: true, name: nameHevc },
+  hev1: { box: "hvcC", bytes: 23, isDescribed: true, name: nameHevc },
+  av01: { box: "av1C", bytes: 4, isDescribed: false, name: ([, a, b]) => `av01.${a >> 5}.${two(a & 31)}${b & 128 ? "H" : "M"}.${b & 64 ? (b & 32 ? "12" : "10") : "08"}` },
+  vp09: { box: "vpcC", bytes: 8, isDescribed: false, name: ([, , , , profile, level, c]) => `vp09.${two(profile)}.${two(level)}.${two(c >> 4)}` },
+};
 const VISUAL_ENTRY = 78; // bytes of a visual sample entry before its boxes
 
 /**
@@ -46,6 +55,36 @@ export function readDescription(head) {
   }
 }
 
+/**
+ * The samples of the one track of a `moov` box whose data is elsewhere.
+ *
+ * @param {Uint8Array} trak the box of a track @param {number} end of the file that its samples are in
+ * @returns {{codec: string, description: Uint8Array, groups: {offset: number, size: number, picture: number}[][]}} groups that decode alone
+ * @throws {GeometryVideoError}
+ */
+export function readSamples(trak, end) {
+  try {
+    const tables = new Tables(trak, end);
+    const { codec, description } = tables.configuration();
+    const { sizes, places, times, keys } = tables.samples();
+    const numbers = ranks(times);
+    const groups = [];
+    let [shown, before] = [0, 0]; // pictures of the groups so far, and of those that are looked at
+    for (let i = 0; i < sizes.length; i++) {
+      // a key frame that a picture of before is shown after, or that one of later is shown before, begins no group of its own
+      if (keys.has(i) && numbers[i] === i && shown === i) groups.push([]);
+      if (!groups.length) throw broken("it does not start with a key frame");
+      groups.at(-1).push({ offset: places[i], size: sizes[i], picture: numbers[i] });
+      before = Math.max(before, numbers[i] + 1);
+      if (before === i + 1) shown = i + 1;
+    }
+    return { codec, description, groups };
+  } catch (error) {
+    if (error instanceof RangeError || error instanceof TypeError) throw broken("its tables end too early");
+    throw error;
+  }
+}
+
 function parseTrack(tables, checksum) {
   const { codec, description } = tables.configuration();
   const { sizes, places, times, keys } = tables.boxes.has("mvex") ? readFragmentSamples(tables.file) : tables.samples();
@@ -62,6 +101,17 @@ function parseTrack(tables, checksum) {
   return { codec, description, groups };
 }
 
+/** As RFC 6381 and ISO/IEC 14496-15, annex E, name HEVC. */
+function nameHevc(data) {
+  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+  const [space, tier, profile] = [["", "A", "B", "C"][data[1] >> 6], data[1] & 32 ? "H" : "L", data[1] & 31];
+  let [flags, reversed] = [view.getUint32(2), 0];
+  for (let bit = 0; bit < 32; bit++, flags >>>= 1) reversed = ((reversed << 1) | (flags & 1)) >>> 0;
+  const constraints = [...data.subarray(6, 12)];
+  while (constraints.length && !constraints.at(-1)) constraints.pop();
+  return [`hvc1.${space}${profile}`, reversed.toString(16), `${tier}${data[12]}`, ...constraints.map((byte) => byte.toString(16))].join(".");
+}
+
 /** Of each time its place among all. */
 export function ranks(times) {
   const order = [...times.keys()].sort((a, b) => times[a] - times[b]);
@@ -71,8 +121,10 @@ export function ranks(times) {
 }
 
 class Tables {
-  constructor(file) {
+  /** @param {number} [end] of the file that samples are in, if that is another */
+  constructor(file, end = file.length) {
     this.file = file;
+    this.end = end;
     this.view = new DataView(file.buffer, file.byteOffset, file.byteLength);
     this.boxes = new Map(); // kind -> [start, end] of its content
     this.#walk(0, file.length);
@@ -117,15 +169,15 @@ class Tables {
     const { first } = this.#rows("stsd", 8);
     const kind = String.fromCharCode(...this.file.subarray(first + 4, first + 8));
     if (kind === "mp4v") return { codec: "jpeg", description: new Uint8Array(0) }; // each picture says what it is
-    if (kind !== "avc1") throw broken(`its video is ${kind}, not H.264`);
+    const codec = CODECS[kind];
+    if (!codec) throw broken(`its video is ${kind}, not H.264`);
     const end = first + this.view.getUint32(first);
     for (let position = first + 8 + VISUAL_ENTRY; position + 8 <= end; ) {
       const size = this.view.getUint32(position);
       if (size < 8 || position + size > end) break;
-      if (String.fromCharCode(...this.file.subarray(position + 4, position + 8)) === "avcC" && size >= 15) {
+      if (String.fromCharCode(...this.file.subarray(position + 4, position + 8)) === codec.box && size >= 8 + codec.bytes) {
         const description = this.file.slice(position + 8, position + size);
-        const hex = [...description.subarray(1, 4)].map((byte) => byte.toString(16).padStart(2, "0"));
-        return { codec: `avc1.${hex.join("")}`, description };
+        return { codec: codec.name(description), description: codec.isDescribed ? description : new Uint8Array(0) };
       }
       position += size;
     }
@@ -142,7 +194,7 @@ class Tables {
   sizes() {
     const common = this.view.getUint32((this.boxes.get("stsz") ?? [NaN])[0] + 4);
     const { first, count } = this.#rows("stsz", common ? 0 : 4, 8);
-    if (!count || count > this.file.length) throw broken(`it has ${count} pictures`);
+    if (!count || count > this.end) throw broken(`it has ${count} pictures`);
     return Uint32Array.from({ length: count }, (_, i) => common || this.view.getUint32(first + 4 * i));
   }
 
@@ -160,7 +212,7 @@ class Tables {
       for (let i = 0; i < inChunk && sample < sizes.length; i++, sample++) {
         places[sample] = place;
         place += sizes[sample];
-        if (place > this.file.length) throw broken("a picture lies outside of it");
+        if (place > this.end) throw broken("a picture lies outside of it");
       }
     }
     if (sample < sizes.length) throw broken("its pictures have no place");

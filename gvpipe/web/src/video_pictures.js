@@ -22,10 +22,11 @@ export class VideoPictures {
    * @param {Uint8Array} file @param {number} fps @param {import("./format/repeated_frames.js").RepeatedFrames} repeated
    * @param {[number, number]} size of a picture, pixels @param {Uint32Array} samples indices of the samples that are read
    * @param {import("./decoded_pictures.js").Finish|null} finish
+   * @param {((video: HTMLVideoElement) => Promise<object>)|null} read in place of levels
    * @returns {Promise<VideoPictures>}
    */
-  static async open(file, fps, repeated, size, samples, finish) {
-    const pictures = new VideoPictures(file, fps, repeated, size, samples, finish);
+  static async open(file, fps, repeated, size, samples, finish, read = null) {
+    const pictures = new VideoPictures(file, fps, repeated, size, samples, finish, read);
     try {
       await pictures.#load();
       await pictures.seek(0);
@@ -36,7 +37,7 @@ export class VideoPictures {
     return pictures;
   }
 
-  constructor(file, fps, repeated, [width, height], samples, finish) {
+  constructor(file, fps, repeated, [width, height], samples, finish, read = null) {
     this.fps = fps;
     this.repeated = repeated;
     this.frames = repeated.frames;
@@ -47,6 +48,9 @@ export class VideoPictures {
     this.height = height;
     this.samples = samples;
     this.finish = finish;
+    this.read = read;
+    /** Of a frame, what must be here before it is shown. @type {((frame: number) => Promise<unknown>)|null} */
+    this.beside = null;
     /** Of the frame shown the levels of its picture (S, 3), or what `finish` made of them. */
     this.current = null;
     /** The picture that the video shows; -1: not known. A video that has loaded may have nothing to draw yet. */
@@ -91,13 +95,18 @@ export class VideoPictures {
     this.frame = frame;
     const picture = this.repeated.distinctOf(frame);
     if (this.shown !== picture) await this.#reach(picture);
-    await this.#take(picture);
+    await this.#take(picture, frame);
   }
 
   /** Have what is shown of the picture that the video shows now. */
-  async #take(picture) {
-    const levels = this.#levels();
-    this.current = this.finish ? await this.finish(picture, levels) : levels;
+  async #take(picture, frame) {
+    const levels = this.read ? await this.read(this.video) : this.#levels();
+    this.current = await this.#finished(picture, levels, frame);
+  }
+
+  async #finished(picture, levels, frame) {
+    const [finished] = await Promise.all([this.finish ? this.finish(picture, levels) : levels, this.beside?.(frame)]);
+    return finished;
   }
 
   async #reach(picture) {
@@ -174,7 +183,7 @@ export class VideoPictures {
       while (latest && this.playing === playing) {
         const { frame, levels } = latest;
         latest = null;
-        this.current = this.finish ? await this.finish(frame, levels) : levels;
+        this.current = await this.#finished(frame, levels, frame);
         if (this.playing === playing) on.show(frame);
       }
     };
@@ -230,7 +239,7 @@ export class VideoPictures {
           await this.#reach(picture);
           if (this.playing !== playing) return;
         }
-        await this.#take(picture);
+        await this.#take(picture, frame);
         if (this.playing !== playing) return;
         this.frame = before = frame;
         show(frame);

@@ -223,6 +223,19 @@ export interface Shot {
   readonly triangles: number;
 }
 
+/** Images with a picture for each frame. */
+export interface MovingImages {
+  /** What is not shown, a line each. */
+  readonly notes: string[];
+  /** Called with a line when a track is given up. */
+  lost: (note: string) => void;
+  readonly isEmpty: boolean;
+  /** That the pictures of a frame are here. */
+  ready(frame: number): Promise<void>;
+  /** The pictures of a frame by number of the image, until others are asked for; null if one is not here. */
+  show(frame: number): Map<number, ImageBitmap> | null;
+}
+
 export class GeometryVideo {
   private constructor();
   /**
@@ -317,6 +330,11 @@ export class GeometryVideo {
   /** Plays on from the frame last shown. `show` gets (V, 3) in an array that is used again for the next frame. */
   play(show: (positions: Float32Array, k: number) => void, options?: PlayOptions): Promise<void>;
   pause(): void;
+  /**
+   * Has the pictures of images that move from now on, those of these numbers: no frame is given before they are here. Of a capture,
+   * those of the shot that is shown. They are closed with the video.
+   */
+  openMoving(wanted: Iterable<number>): Promise<MovingImages>;
   /** Frees it; it is of no use afterwards. What is under way rejects with an `AbortError`. */
   close(): void;
 }

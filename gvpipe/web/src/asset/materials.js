@@ -2,6 +2,9 @@
 
 import { AssetEntry } from "./asset_entry.js";
 
+/** Media type of images that move (`moving/moving_images.js`). */
+export const MOVING = "video/mp4";
+
 const TEXTURES = [
   "base_color_texture",
   "metallic_roughness_texture",
@@ -100,11 +103,12 @@ function readTexture(entry, nImages) {
   };
 }
 
-/** @returns {{name: string, mediaType: string, data: Uint8Array}[]} */
+/** Of images that move, data is null. @returns {{name: string, mediaType: string, data: Uint8Array|null}[]} */
 export function readImages(list, payload) {
   return list.map((given, number) => {
     const entry = new AssetEntry(given, `image ${number}`);
-    const data = payload.section(entry.text("section"));
-    return { name: entry.text("name", ""), mediaType: entry.text("media_type", ""), data };
+    const mediaType = entry.text("media_type", "");
+    const data = mediaType === MOVING ? null : payload.section(entry.text("section"));
+    return { name: entry.text("name", ""), mediaType, data };
   });
 }

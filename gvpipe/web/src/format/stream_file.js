@@ -8,19 +8,19 @@ import { readDescription, ranks } from "../track.js";
 import { STREAM_LAYOUT_MAX_INDEX as MAX_INDEX } from "../constants.js";
 import { endOfHead, findIndex, readTag } from "./boxes.js";
 import { crc32 } from "./checksum.js";
+import { readCompanions } from "./companion_parts.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 import { liveSize, placeClips, readLive, readRows, ROW_BYTES } from "./live_layout.js";
 import { clipName, readHeader } from "./header.js";
 import { Ranges } from "./ranges.js";
 import { joined, nameOf } from "./request.js";
 import { readShots } from "./shot_layout.js";
-import { checkHead, readIndex } from "./stream_layout.js";
+import { checkHead, OF_COMPANIONS, readIndex } from "./stream_layout.js";
 
 const FIRST = 1 << 16; // bytes of the first request
 const OF_SEGMENTS = /^(transforms|trajectories|basis|coefficients|anchors|deltas|clip)\.(\d+)$/;
 const OF_PICTURES = /^(transforms|trajectories)\./; // whose fragments need WebCodecs
 const OF_FIELDS = /^field\./;
-const OF_COMPANIONS = /^companion\./; // which the browser fetches
 const FIRST_LIVE = 1 << 17; // bytes of the second request, of a file that is still written
 const ROWS = 64; // of the table of clips, asked for at once
 const LOOK_AGAIN = 500; // ms between looks for a first clip
@@ -92,6 +92,8 @@ export class StreamFile {
   constructor(source) {
     this.source = source;
     this.start = null; // bytes that came at first, until a segment is here
+    this.head = null; // the boxes `ftyp` and `moov`, without companions
+    this.wholeHead = null; // with them
     /** Sections that are here, by name. */
     this.sections = new Map();
     this.segments = new Map(); // number -> names of its sections
@@ -126,6 +128,12 @@ export class StreamFile {
   /** What a decoder of its pictures is set up with. @throws {GeometryVideoError} */
   get description() {
     return readDescription(this.head);
+  }
+
+  /** The companions that its header describes, of which parts are fetched. @returns {import("./companion_parts.js").Companion[]} */
+  companions(described) {
+    const read = (offset, length) => this.#fetch(offset, length);
+    return this.wholeHead ? readCompanions(described, this.wholeHead, (number) => this.places.get(`companion.${number}`), read) : [];
   }
 
   /** What `readContainer` gives of a whole file. */
@@ -212,6 +220,7 @@ export class StreamFile {
     if (!names.some((name) => OF_SEGMENTS.test(name))) return false;
     if (names.some((name) => OF_PICTURES.test(name)) && typeof VideoDecoder !== "function") return false;
     this.head = checkHead(data, headSize, headChecksum);
+    this.wholeHead = data.slice(0, headSize);
     this.id = readTag(this.head)?.[2] ?? "";
     this.size = size;
     this.places = new Map(entries.map((entry) => [entry.name, entry]));

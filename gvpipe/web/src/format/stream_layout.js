@@ -14,6 +14,7 @@ import { withoutCompanions } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, corrupt, GeometryVideoError } from "./errors.js";
 
+export const OF_COMPANIONS = /^companion\./; // sections that are read apart
 const BOX_HEAD = 8; // bytes of the heads of `mdat` boxes
 
 /**
@@ -31,6 +32,7 @@ export function readStream(file, box) {
   checkHead(file, headSize, headChecksum);
   const sections = new Map();
   for (const { name, offset, length, checksum } of entries) {
+    if (OF_COMPANIONS.test(name)) continue; // whose damage is theirs alone
     const data = take(file, offset, length);
     if (crc32(data) !== checksum) throw corrupt(name, "its checksum does not match");
     sections.set(name, data);

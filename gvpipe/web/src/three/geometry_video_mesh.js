@@ -32,7 +32,7 @@ import { pickPoint, pickTriangle } from "./picking.js";
 import { polygonEdges } from "./polygon_edges.js";
 import { cornerEntries, splitVertices } from "./render_vertices.js";
 import { ShotTextures } from "./shot_textures.js";
-import { openTextures } from "./textures.js";
+import { openTextures, shownImages } from "./textures.js";
 import { colourAttribute, colourArray, uvArray, uvChannels } from "./vertex_attributes.js";
 import { Warp, canMove } from "./warp.js";
 
@@ -53,14 +53,16 @@ export class GeometryVideoMesh extends Mesh {
    * @returns {Promise<GeometryVideoMesh>}
    */
   static async create(video, { centre = [0, 0, 0], scale = 1, gloss = true, anisotropy = 1, environment = () => null, ownClock = false } = {}) {
+    const moving = await video.openMoving(shownImages(video));
     const positions = await video.frame(video.startFrame);
-    const textures = await openTextures(video, anisotropy);
-    return new GeometryVideoMesh(video, positions, textures, { centre, scale, gloss, anisotropy, environment, ownClock });
+    const textures = await openTextures(video, anisotropy, moving, video.startFrame);
+    return new GeometryVideoMesh(video, positions, textures, { moving, centre, scale, gloss, anisotropy, environment, ownClock });
   }
 
   #view;
   #textures;
   #shotTextures = null; // of a capture
+  #moving; // MovingImages, of the shot that is drawn
   #playback;
   #now = 0; // ms of `update`'s clock
   #tick = null; // what waits for its next step
@@ -104,6 +106,8 @@ export class GeometryVideoMesh extends Mesh {
     this.video = video;
     this.#view = view;
     this.#textures = textures;
+    this.#moving = view.moving;
+    view.moving.lost = (note) => (this.notes = [...this.notes, note]);
     this.frustumCulled = false; // the box of the motion may be a little small
     this.#open(positions, new Set());
     const on = {
@@ -117,7 +121,7 @@ export class GeometryVideoMesh extends Mesh {
       },
     };
     const grown = () => this.dispatchEvent({ type: video.isLive ? "progress" : "durationchange" });
-    if (video.shots.length > 1) this.#shotTextures = new ShotTextures(video.shot, textures, view.anisotropy);
+    if (video.shots.length > 1) this.#shotTextures = new ShotTextures(video.shot, textures, view.moving, view.anisotropy);
     const ready = (shot, number, own) => Promise.all([this.#shotTextures.ready(shot, number), this.#loadFields(shot, own)]);
     this.#unfollow = video.follow({ grown, lost: on.fail, ready, closed: (number) => this.#shotTextures.closed(number) });
     this.#playback = new Playback(video, on, view.ownClock ? undefined : (tick) => (this.#tick = tick));
@@ -411,7 +415,9 @@ export class GeometryVideoMesh extends Mesh {
   }
 
   #show(positions, k) {
-    if (this.video.level === this.#level && this.video.shot === this.#shot) {
+    const isSame = this.video.level === this.#level && this.video.shot === this.#shot;
+    if (isSame && !this.#showPictures(k)) return;
+    if (isSame) {
       this.#place(positions);
       this.#setBounds();
       this.#update();
@@ -421,6 +427,16 @@ export class GeometryVideoMesh extends Mesh {
       this.#changeMesh(positions);
     }
     this.dispatchEvent({ type: "frame", frame: k });
+  }
+
+  /** Show the pictures of textures that move; false where they are gone by now, and the frame is not shown. */
+  #showPictures(k) {
+    const moving = this.#moving;
+    if (!moving || this.video.level > 0) return true;
+    const pictures = moving.show(this.video.ownFrame(k));
+    if (pictures) this.#textures.show(pictures);
+    else if (this.paused) this.#playback.seek(k); // another frame was asked for meanwhile
+    return pictures !== null;
   }
 
   /** Make all that depends on vertices and triangles; of these parts none is drawn. */
@@ -441,7 +457,7 @@ export class GeometryVideoMesh extends Mesh {
     const { channels, notes } = uvChannels(video.materials, video.attributes);
     this.#channels = channels;
     /** What is not shown as it should be, a line each. */
-    this.notes = [...video.notes, ...notes, ...this.#textures.notes];
+    this.notes = [...video.notes, ...notes, ...this.#textures.notes, ...(this.#moving?.notes ?? [])];
     if (video.triangleCount && !this.#groupsOf.has(video.level)) this.#groupsOf.set(video.level, this.#groupNormals());
     this.#groups = this.#groupsOf.get(video.level) ?? null;
     this.#normals = null;
@@ -463,6 +479,9 @@ export class GeometryVideoMesh extends Mesh {
     if (isShot) {
       this.#groupsOf.clear();
       this.#textures = this.#shotTextures.show(video.shot) ?? this.#textures;
+      this.#moving = this.#shotTextures.moving;
+      const pictures = this.#moving?.show(this.#own);
+      if (pictures) this.#textures.show(pictures);
     }
     this.#open(positions, this.#parts.hidden);
     if (this.#isWired && !this.#wires) this.setWireframe(true);
@@ -470,7 +489,8 @@ export class GeometryVideoMesh extends Mesh {
     for (const left of before) left.dispose();
     this.dispatchEvent(isShot ? { type: "shotchange", shot: video.shot } : { type: "levelchange", level: video.level });
     if (!video.images.length || this.#textures.images === video.images || (isShot && this.#shotTextures.isShown(video.shot))) return;
-    const opened = isShot ? this.#shotTextures.ready(video, video.shot) : openTextures(video, this.#view.anisotropy);
+    const { anisotropy } = this.#view;
+    const opened = isShot ? this.#shotTextures.ready(video, video.shot) : openTextures(video, anisotropy, this.#moving, this.currentFrame);
     this.#opening = opened.then((textures) => this.#takeTextures(textures, video.shot));
   }
 
@@ -480,8 +500,12 @@ export class GeometryVideoMesh extends Mesh {
       if (!this.#shotTextures) textures.dispose();
       return;
     }
-    if (this.#shotTextures) this.#shotTextures.show(shot);
-    else this.#textures.dispose();
+    if (this.#shotTextures) {
+      this.#shotTextures.show(shot);
+      this.#moving = this.#shotTextures.moving;
+    } else {
+      this.#textures.dispose();
+    }
     this.#textures = textures;
     this.notes = [...this.notes, ...textures.notes];
     if (this.video.images !== textures.images || !this.video.triangleCount) return;

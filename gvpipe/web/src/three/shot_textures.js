@@ -1,16 +1,20 @@
 /** Textures of the shots of a capture that are open. Shots of the same images share theirs. */
 
-import { openTextures } from "./textures.js";
+import { MOVING } from "../asset/materials.js";
+import { openTextures, shownImages } from "./textures.js";
 
 export class ShotTextures {
   #anisotropy;
-  #ofShot = new Map(); // shot -> {images, opened: promise of Textures, textures: null until then}
+  #ofShot = new Map(); // shot -> {images, opened: promise of Textures, textures: null until then, moving: MovingImages, or null}
   #shown; // one of these, perhaps of a shot that is closed
 
-  /** @param {number} shot that is shown @param {import("./textures.js").Textures} textures of it @param {number} anisotropy */
-  constructor(shot, textures, anisotropy) {
+  /**
+   * @param {number} shot that is shown @param {import("./textures.js").Textures} textures of it
+   * @param {import("../moving/moving_images.js").MovingImages} moving of it @param {number} anisotropy
+   */
+  constructor(shot, textures, moving, anisotropy) {
     this.#anisotropy = anisotropy;
-    this.#shown = { images: textures.images, opened: Promise.resolve(textures), textures };
+    this.#shown = { images: textures.images, opened: Promise.resolve(textures), textures, moving };
     this.#ofShot.set(shot, this.#shown);
   }
 
@@ -28,6 +32,11 @@ export class ShotTextures {
     this.#shown = entry;
     this.#drop(before);
     return entry.textures;
+  }
+
+  /** Images that move, of the shot that is shown; its video closes them. */
+  get moving() {
+    return this.#shown.moving;
   }
 
   /** Whether those of a shot are shown. */
@@ -52,8 +61,13 @@ export class ShotTextures {
   }
 
   #open(video) {
-    const entry = { images: video.images, opened: openTextures(video, this.#anisotropy), textures: null };
-    entry.opened.then((textures) => (entry.textures = textures));
+    const entry = { images: video.images, opened: null, textures: null, moving: null };
+    const open = async () => {
+      entry.moving = await video.openMoving(shownImages(video));
+      entry.textures = await openTextures(video, this.#anisotropy, entry.moving, 0);
+      return entry.textures;
+    };
+    entry.opened = open();
     return entry;
   }
 
@@ -63,7 +77,8 @@ export class ShotTextures {
   }
 }
 
-/** Whether images are the same bytes: shots share sections of the file. */
+/** Whether images are the same bytes, and none moves: shots share sections of the file. */
 function areSame(images, others) {
+  if (images.some(({ mediaType }) => mediaType === MOVING)) return false;
   return images.length === others.length && images.every(({ data, mediaType }, i) => data === others[i].data && mediaType === others[i].mediaType);
 }
