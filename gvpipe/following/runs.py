@@ -1,10 +1,10 @@
 """Runs of frames that one key mesh follows, as long as they get.
 
 1. The key is the run's first frame. It is followed until a frame fails.
-2. The frame that failed becomes the key. If it can be followed back to the run's first frame, it is followed on from there, and
-   step 2 is repeated from where that fails. So a key tends to the middle of its run, and a surface that touches itself, which
-   cannot be followed to where it parts, has a key from where it is apart.
-3. Otherwise, or where the run is long, it ends there.
+2. The frame that failed becomes the key. If it can be followed back to the run's first frame, it is followed on from there.
+   So a key is in the middle of its run. A surface that touches itself has a key from where it is apart: it cannot be followed
+   to where it parts.
+3. Otherwise, or where the run is long, the first key stays.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from gvpipe.foundation.arrays import Float64, Frames, Int32
 
 KEY_SHARE = 0.45  # of the errors that a followed frame may have: what a key's own may be
 GIVEN_VERTICES = 1.5  # where the number of vertices is given, frames may have this many times the key's rms
-MOST_KEYS = 3  # that are tried for one run
+MOST_KEYS = 2  # that are tried for one run
 LONG = 64  # frames: a run of so many gains little from another key
 
 
