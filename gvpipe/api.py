@@ -226,7 +226,7 @@ def encode(
         track: of a capture whose frames have meshes of their own: let key meshes follow the surface, so that long shots take
             their place (`gvpipe.captures.tracking`); ``max_error`` then bounds the distance between the surfaces, both ways.
             None: where most frames have a mesh of their own, and nothing but colours would be lost. Without a target, vertices
-            are then coded to an rmse of 0.0007 of the diagonal.
+            are then coded to an rmse of 0.0005 of the diagonal.
         vertices: of each key mesh; None: as few as its distance from the surface allows.
         stream: write the stream layout, which plays over HTTP while it loads (`restream`).
         bare: write the bare layout, for data sets: without poster and what else only players need.
