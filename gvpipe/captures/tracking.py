@@ -21,9 +21,7 @@ LONG = 8  # frames of a shot that is kept as it is
 COLOUR = "color"
 SHARE = 0.6  # of a largest distance that is asked for: what following may use, and coding the rest
 RMS_SHARE = 0.3  # of the same: the greatest rms
-CODED_RMSE = (
-    0.0005  # of vertices, part of the diagonal: as far off the surface as `RMS`, since most of it lies along the surface
-)
+CODED_RMSE = 0.0005  # of vertices, part of the diagonal; most of it lies along the surface
 SURFACE_ALONE = "only the surface is followed"
 
 Targets = tuple[float | None, float | None, float | None, float | str | None]
