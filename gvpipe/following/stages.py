@@ -44,12 +44,15 @@ MOTION = (
 """The coarse mesh, from where a frame is expected to the surface."""
 
 SURFACE = (
-    Stage(3, 1.0, 0.01, 0.3, 0.04),
-    Stage(3, 0.3, 0.02, 0.0, 0.04, hold=0.5, follows_borders=True, flows=True),
-    Stage(3, 0.05, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
-    Stage(3, 0.01, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
+    Stage(2, 1.0, 0.01, 0.3, 0.04),
+    Stage(3, 0.3, 0.02, 0.0, 0.04, hold=0.5, follows_borders=True),
+    Stage(3, 0.1, 0.02, 0.0, 0.04, hold=0.5, follows_borders=True),
+    Stage(3, 0.03, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True),
 )
 """The whole mesh, onto the surface: in the end all that is left of the distance counts, whatever the normals."""
 
-REPAIR = (Stage(4, 0.03, 0.05, -0.5, 0.08, hold=0.5, follows_borders=True, flows=True, emphasis=0.002),)
-"""Where some part is too far still: far pairs count most, whatever their normals."""
+REPAIR = (
+    Stage(3, 0.05, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
+    Stage(3, 0.01, 0.02, 0.0, 0.04, hold=0.3, follows_borders=True, flows=True),
+)
+"""Where that is not near enough: softer, and each round starts from the shape of the one before."""
