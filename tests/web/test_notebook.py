@@ -125,7 +125,10 @@ def test_traits_move_the_player(notebook: Any) -> None:
     assert state == [0.5, "height", [0, 2], ["near"], [40, 30]]
     run_cell(notebook, "w.field = w.range = w.parts = None; w.playing = True")
     in_player(notebook, "await until(() => !element.paused && element.currentFrame > 10 && !element.hiddenParts.size);")
-    run_cell(notebook, "w.playing = False; w.frame = 3")
+    run_cell(notebook, "w.playing = False")
+    in_player(notebook, "await until(() => element.paused);")
+    _settled(notebook, "w.frame")
+    run_cell(notebook, "w.frame = 3")
     in_player(notebook, "await until(() => element.paused && element.currentFrame === 3);")
 
 
