@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gvpipe.foundation.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report, Restreamed, compare, decode, encode, open, open_capture, render, restream, skin
+    from gvpipe.api import Restreamed, compare, decode, encode, open, open_capture, render, restream, skin
     from gvpipe.asset.attribute import Attribute
     from gvpipe.asset.field import Field
     from gvpipe.asset.material import Image, Material, Texture
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from gvpipe.asset.part import Part
     from gvpipe.batch.runs import BatchReport, encode_all
     from gvpipe.captures.files import write
+    from gvpipe.encoding.report import Report
     from gvpipe.foundation.errors import GvpipeError
     from gvpipe.grids.cells import Cells
     from gvpipe.grids.volume import Volume
@@ -97,7 +98,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "gvpipe.api": ("Report", "Restreamed", "compare", "decode", "encode", "open", "open_capture", "render", "restream", "skin"),
+    "gvpipe.encoding.report": ("Report",),
+    "gvpipe.api": ("Restreamed", "compare", "decode", "encode", "open", "open_capture", "render", "restream", "skin"),
     "gvpipe.asset.attribute": ("Attribute",),
     "gvpipe.asset.field": ("Field",),
     "gvpipe.asset.material": ("Image", "Material", "Texture"),

@@ -2,114 +2,52 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gvpipe.asset_coding.directory import SECTION as ASSET_SECTION
-from gvpipe.asset_coding.moving_textures import MovingCoding, alpha_notes
+from gvpipe.asset_coding.moving_textures import MovingCoding
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.sound_track import KIND as SOUND_KIND
-from gvpipe.asset_coding.sound_track import pack_sound, whole_sound
+from gvpipe.asset_coding.sound_track import pack_sound
 from gvpipe.asset_coding.sound_track import read_sound as read_sound_track
-from gvpipe.captures import tracking
-from gvpipe.captures.encoding import CodedShot, write_capture
-from gvpipe.coding.codec import Codec, Encoded
-from gvpipe.coding.registry import check_mapped, codec_class, encode_sequence, make_codec, segment_parts
+from gvpipe.coding.codec import Codec
+from gvpipe.coding.registry import check_mapped, segment_parts
 from gvpipe.coding.segment_memory import fit_segments
 from gvpipe.container.bitstream import BARE, LIVE, PLAIN, SHOTS, STREAM, Bitstream
-from gvpipe.container.mp4 import bytes_by_part, file_bytes, load, read_bytes, read_file, write_file
+from gvpipe.container.mp4 import bytes_by_part, load, read_file, write_file
 from gvpipe.container.shots import copy_shots
-from gvpipe.container.sources import check_target, check_video_target, is_remote, is_stored
-from gvpipe.foundation import notes
+from gvpipe.container.sources import check_target, check_video_target
+from gvpipe.encoding.capture import CaptureRequest, encode_capture
+from gvpipe.encoding.inputs import is_among, may_share, open_with_inside, segments_coded_by, some_frames
+from gvpipe.encoding.report import Report, StageClock
+from gvpipe.encoding.request import LAYOUTS, TARGETS, Request, check_wanted, chosen_codecs, one_target
+from gvpipe.encoding.sequence import code_sequence, coding_notes, refusal_notes, write_coded
 from gvpipe.foundation.arguments import StrPath, check_number, check_path, show
-from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.cores import count_cores
-from gvpipe.foundation.errors import InputError, OverBudget, SettingError, SeveralShots, TopologyChange, in_file
+from gvpipe.foundation.errors import InputError, SeveralShots, TopologyChange, in_file
 from gvpipe.foundation.progress import Progress
 from gvpipe.media.sound import Sound
-from gvpipe.metrics.vertex_errors import Errors, frame_diagonal
 from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
-from gvpipe.model.warp import warped
 from gvpipe.playback.capture_player import CapturePlayer
 from gvpipe.playback.files import Source, add_texture, add_texture_to_shots, frame_range, read, read_capture
 from gvpipe.playback.player import Player
 from gvpipe.playback.sounds import AudioOptions, sound_beside, with_sound
-from gvpipe.rate_control.codec_choice import choose_codec, default_target
-from gvpipe.rate_control.purposes import candidates, check_purpose, check_serves
-from gvpipe.rate_control.search import meet
-from gvpipe.rate_control.targets import Target, parse_bound, read_bound
-from gvpipe.rate_control.trials import Trial
+from gvpipe.rate_control.targets import parse_bound, read_bound
 from gvpipe.rendering.poster import poster_of
 from gvpipe.runtime import first_kernels
-from gvpipe.runtime.segment_map import segments_mapped_by
 from gvpipe.tasks.choice import AUTO_WORKERS, open_executor
-from gvpipe.tasks.executor import Executor
-from gvpipe.tasks.segments import RemoteSegments, SharedSegments
-
-COSTLY_VERTEX = 400  # bytes of memory, with its triangles: less than any codec takes
-COSTLY_ATTRIBUTES = 4000  # bytes of memory, of a vertex with attributes of 40 components in all
 
 if TYPE_CHECKING:
-    from gvpipe.asset_coding.encoder import AssetCoder, Plan
     from gvpipe.metrics.comparison import Comparison
     from gvpipe.rasterizer.camera import Camera
-
-TARGETS = ("target_rmse", "target_kg", "target_bpvf", "max_error")
-LAYOUTS = ("stream", "bare")
-NO_TARGETS = (None, None, None, None)
-CAPTURE_CODEC = "pca"  # of shots, which are short: `mcgv` looks for motion that they do not have
-
-
-@dataclass(frozen=True)
-class Report:
-    """What an encode did.
-
-    Args:
-        bpvf: bits per vertex and frame of the whole file.
-        seconds: the whole as ``encode``, then each stage.
-        not_carried: names of attributes and fields of the sequence that the file does not hold, and what the source has beside.
-        sections: as in `Info`.
-        tried: where a target was given, or codec ``auto``: every encode that was measured (`gvpipe.rate_control.trials.Trial`).
-        reason: why the encode in the file was chosen among those.
-        notes: what a user should know, a line each.
-        errors: ``rmse``, ``rmse_diag``, ``max``, ``max_diag`` and ``kg`` of the file, as in `Comparison`, where a target was
-            given or codecs competed; else empty.
-        shots: of a capture: ``start``, ``frames``, ``vertices``, ``triangles``, ``codec`` and ``bytes`` of each. Then
-            ``vertices`` and ``triangles`` are those of the largest, ``codec`` and ``settings`` those of the first.
-        audio: as in `Info`.
-    """
-
-    codec: str
-    settings: dict[str, Any]
-    vertices: int
-    triangles: int
-    frames: int
-    fps: float
-    bytes: int
-    bpvf: float
-    seconds: dict[str, float]
-    not_carried: list[str]
-    sections: dict[str, int]
-    tried: list[dict[str, Any]]
-    reason: str
-    notes: list[str]
-    errors: dict[str, float | None] = field(default_factory=dict)
-    shots: list[dict[str, Any]] = field(default_factory=list)
-    audio: dict[str, Any] | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """The report as JSON values."""
-        return dataclasses.asdict(self)
 
 
 @dataclass(frozen=True)
@@ -130,25 +68,6 @@ class Restreamed:
     def to_json(self) -> dict[str, Any]:
         """The same as JSON values."""
         return dataclasses.asdict(self)
-
-
-@dataclass
-class _StageClock:
-    """Passes progress on and adds up the seconds of each stage, from ``started`` on."""
-
-    progress: Progress | None
-    started: float = field(default_factory=time.perf_counter)
-    seconds: dict[str, float] = field(default_factory=dict)
-    _stage: str = ""
-    _since: float = 0.0
-
-    def __call__(self, stage: str, done: float) -> None:
-        now = time.perf_counter()
-        if self._stage:
-            self.seconds[self._stage] = self.seconds.get(self._stage, 0.0) + now - self._since
-        self._stage, self._since = stage, now
-        if self.progress and stage:
-            self.progress(stage, done)
 
 
 def encode(
@@ -248,47 +167,47 @@ def encode(
     from gvpipe.asset_coding.encoder import AssetCoder
 
     check_video_target(path, "gvpipe.encode's path")
-    _check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
+    check_wanted((target_rmse, target_kg, target_bpvf, max_error), stream, bare)
     sounds = AudioOptions(audio, audio_codec, audio_bitrate, audio_trim)
-    request = _Request(codec, settings, purpose, (target_rmse, target_kg, target_bpvf, max_error))
+    request = Request(codec, settings, purpose, (target_rmse, target_kg, target_bpvf, max_error), KEYWORDS)
     given = request.candidates()
     is_shared = workers == AUTO_WORKERS and scheduler is None
     if workers == AUTO_WORKERS:
-        workers = count_cores() if is_shared and memory is None and _may_share(given, source) else None
+        workers = count_cores() if is_shared and memory is None and may_share(given, source) else None
     if scheduler is not None or not (workers is None or is_shared):
         check_mapped(given)
     moving = MovingCoding(texture_codec, texture_quality)
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
-    clock = _StageClock(progress)
+    clock = StageClock(progress)
     layout = STREAM if stream else BARE if bare else PLAIN
     with open_executor(scheduler, workers) as executor:
         options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
         options |= {"real_time": real_time, "warp": warp}
         beside = AssetOptions.of(attributes, fields, textures, moving)
         if isinstance(source, Capture):
-            capture = _some_of(source, frames, fps)
+            capture = some_frames(source, frames, fps)
             capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
-            wanted = _CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
-            return _encode_capture(capture, wanted, path, clock)
+            wanted = CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
+            return encode_capture(capture, wanted, path, clock)
         try:
-            sequence, spares_volume, chosen = _open_with_inside(source, path, fps, options, volume)
+            sequence, spares_volume, chosen = open_with_inside(source, path, fps, options, volume)
             sequence = with_sound(sequence, sounds, frames)
             sequence = sequence if texture is None else add_texture(sequence, texture, frames)
             options["volume"] = sequence.volume is not None
             if memory is not None:
                 given = fit_segments(given, sequence.n_vertices, memory)
-            target = _target(sequence, *request.targets)
+            target = one_target(sequence, *request.targets)
             asset = AssetCoder(sequence, dataclasses.replace(beside, spares_volume=spares_volume))
-            with _segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
-                coded = _code(sequence, given, target, asset, bare, clock)
+            with segments_coded_by(executor, sequence, source, {"fps": fps, **options}, is_shared):
+                coded = code_sequence(sequence, given, target, asset, bare, clock)
         except TopologyChange:
             if isinstance(source, MeshSequence):
                 raise
             capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
             capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
-            wanted = _CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
-            return _encode_capture(capture, wanted, path, clock)
-    size, bitstream = _write(sequence, coded, path, clock, layout)
+            wanted = CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
+            return encode_capture(capture, wanted, path, clock)
+    size, bitstream = write_coded(sequence, coded, path, clock, layout)
     clock("", 1.0)
     chosen += () if asset.volume_choice is None else (asset.volume_choice.note,)
     return Report(
@@ -305,125 +224,10 @@ def encode(
         sections=bytes_by_part(bitstream, size),
         tried=[trial.to_json() for trial in coded.tried],
         reason=coded.reason,
-        notes=[*_notes(sequence, target, asset.plan), *asset.sound_notes, *chosen, *_refusal(path, bitstream, size)],
+        notes=[*coding_notes(sequence, target, asset.plan), *asset.sound_notes, *chosen, *refusal_notes(path, bitstream, size)],
         audio=None if asset.sound is None else asset.sound.to_json(),
         errors={} if coded.errors is None else dataclasses.asdict(coded.errors),
     )
-
-
-@dataclass(frozen=True)
-class _Request:
-    """What was asked for: a codec or some, their settings, a purpose, and the values of `TARGETS`."""
-
-    codec: str | Codec | Sequence[Codec] | None
-    settings: dict[str, Any]
-    purpose: str | None
-    targets: tuple[float | None, float | None, float | None, float | str | None]
-
-    def candidates(self, default: str | None = None) -> Codec | Sequence[Codec]:
-        """The settings object of the codec, or of all to choose from; ``default`` where neither codec nor purpose is given."""
-        codec = default if self.codec is None and self.purpose is None else self.codec
-        return _candidates(codec, self.settings, self.purpose)
-
-
-@dataclass(frozen=True)
-class _CaptureRequest:
-    """What was asked for of a capture: `encode`'s arguments."""
-
-    request: _Request
-    beside: AssetOptions
-    sounds: AudioOptions
-    frames: tuple[int, int | None] | None
-    memory: int | None
-    layout: str
-    track: bool | None
-    vertices: int | None
-
-
-def _encode_capture(capture: Capture, wanted: _CaptureRequest, path: StrPath, clock: _StageClock) -> Report:
-    """Encode each shot as a sequence."""
-    from gvpipe.asset_coding.encoder import AssetCoder
-
-    request, memory = wanted.request, wanted.memory
-    if wanted.layout == BARE:
-        raise SettingError(f"{capture.name}: vertices or triangles change; bare files keep them: leave out bare (--bare)")
-    diagonal = frame_diagonal(capture.shots[0])
-    n_given, change = len(capture.shots), capture.lengths[0]
-    tracked = _tracked(capture, wanted, diagonal, clock)
-    capture = tracked.capture
-    given = request.candidates(CAPTURE_CODEC if _knows(CAPTURE_CODEC, request.settings) else None)
-    is_free = request.codec is None and request.purpose is None and "reorder" not in request.settings
-
-    def code(number: int, shot: MeshSequence, progress: Progress) -> CodedShot:
-        fitting = given if memory is None else fit_segments(given, shot.n_vertices, memory)
-        is_followed = tracked.keys[number] is not None
-        if is_free and (len(shot) == 1 or is_followed) and isinstance(fitting, Codec):  # nobody knows its vertices
-            fitting = dataclasses.replace(fitting, reorder=True)
-        targets = tracking.coding_targets(request.targets, is_followed) if tracked.is_any else request.targets
-        if targets == NO_TARGETS and tracked.is_any and "quality" not in request.settings:
-            targets = (tracking.CODED_RMSE, None, None, None)
-        target = _shot_target(shot, targets, diagonal)
-        asset = AssetCoder(shot.with_sound(None), wanted.beside)
-        coded = _code(shot, fitting, target, asset, True, progress)
-        x, y, z = shot.origin.tolist()
-        bitstream = dataclasses.replace(coded.encoded.bitstream, origin=(x, y, z), is_bare=True)
-        if coded.check is not None:
-            coded.check(read_bytes(file_bytes(bitstream), os.fspath(path)))
-        left_out = [*sorted(asset.plan.left_out), *shot.not_carried]
-        return CodedShot(bitstream, coded.codec, _notes(shot, target, asset.plan), left_out)
-
-    sound, heard = sound_beside(capture.sound, len(capture) / capture.fps, wanted.sounds, capture.fps, wanted.frames)
-    sound, damaged = whole_sound(sound)
-    companions = () if sound is None else (pack_sound(sound),)
-    found = write_capture(capture, path, code, clock, wanted.layout == STREAM, companions)
-    clock("", 1.0)
-    first, size = found.coded[0], found.written.size
-    many = [] if n_given < 2 else [notes.shots(capture.name, n_given, len(capture.shots), change), *tracked.notes]
-    return Report(
-        codec=first.codec.id,
-        settings=dataclasses.asdict(first.codec),
-        vertices=max(row["vertices"] for row in found.shots),
-        triangles=max(row["triangles"] for row in found.shots),
-        frames=len(capture),
-        fps=capture.fps,
-        bytes=size,
-        bpvf=8 * size / found.n_samples,
-        seconds={"encode": time.perf_counter() - clock.started, **clock.seconds},
-        not_carried=found.not_carried,
-        sections={**found.written.sections, "container": size - sum(found.written.sections.values())},
-        tried=[],
-        reason="",
-        notes=[*many, *heard, *damaged, *found.notes],
-        shots=[{**row, "key": key} for row, key in zip(found.shots, tracked.keys, strict=True)],
-        audio=None if sound is None else sound.to_json(),
-    )
-
-
-def _tracked(capture: Capture, wanted: _CaptureRequest, diagonal: float, clock: _StageClock) -> tracking.Tracked:
-    """The capture as it came, or with its surface followed."""
-    if wanted.track is False or (wanted.track is None and not tracking.is_tracked_by_default(capture)):
-        return tracking.Tracked(capture, (None,) * len(capture.shots), ())
-    bound = wanted.request.targets[TARGETS.index("max_error")]
-    part = None if bound is None or not diagonal else parse_bound(bound, capture.shots[0]) / diagonal
-    return tracking.track(capture, part, wanted.vertices, clock)
-
-
-def _knows(codec: str, settings: Mapping[str, Any]) -> bool:
-    """Whether a codec has settings of these names."""
-    return settings.keys() <= {each.name for each in dataclasses.fields(codec_class(codec))}
-
-
-def _shot_target(
-    shot: MeshSequence, targets: tuple[float | None, float | None, float | None, float | str | None], diagonal: float
-) -> Target | None:
-    """The target of a shot; parts of a diagonal are of the capture's, model units."""
-    rmse, kg, bpvf, bound = targets
-    own = frame_diagonal(shot)
-    if rmse is not None and own > 0:
-        rmse *= diagonal / own
-    if bound is not None and read_bound(bound)[1] and own > 0:
-        bound = f"{read_bound(bound)[0] * diagonal / own!r}%"
-    return _target(shot, rmse, kg, bpvf, bound)
 
 
 KEYWORDS = tuple(name for name in signature(encode).parameters if name != "settings")
@@ -757,11 +561,11 @@ def render(
     )
     check_output(target, options)
     for given in (source, error_of):
-        if given is not None and _is_among(path, given):
+        if given is not None and is_among(path, given):
             raise InputError(f"{path} is an input too, which the picture would replace; choose another name")
     reference = error_of if error_of is None or isinstance(error_of, MeshSequence) else read(error_of, unlimited=unlimited)
     if isinstance(source, Capture):
-        return list(write_capture_pictures(_some_of(source, frames, fps), target, options, progress))
+        return list(write_capture_pictures(some_frames(source, frames, fps), target, options, progress))
     reading: dict[str, Any] = {"unlimited": unlimited, "volume": cut is not None}
     try:
         if isinstance(source, MeshSequence):
@@ -777,12 +581,6 @@ def render(
     return list(write_capture_pictures(capture, target, options, progress))
 
 
-def _some_of(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:
-    """Some frames of a capture, at another rate."""
-    capture = capture if frames is None else capture.part(*frames)
-    return capture if fps is None else capture.with_fps(fps)
-
-
 def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywords: Any) -> dict[str, Any]:
     """Keywords for `encode`, checked as far as can be without a sequence; a codec's settings become its settings object.
 
@@ -791,207 +589,10 @@ def checked_keywords(codec: str | Codec | Sequence[Codec] | None = None, **keywo
     """
     settings = {name: value for name, value in keywords.items() if name not in KEYWORDS}
     others = {name: value for name, value in keywords.items() if name in KEYWORDS}
-    _check_wanted([others.get(name) for name in TARGETS], *(others.get(name, False) for name in LAYOUTS))
+    check_wanted([others.get(name) for name in TARGETS], *(others.get(name, False) for name in LAYOUTS))
     if others.get("max_error") is not None:
         read_bound(others["max_error"])
-    given = _candidates(codec, settings, others.get("purpose"))
+    given = chosen_codecs(codec, settings, others.get("purpose"), KEYWORDS)
     if others.get("memory") is not None:
         fit_segments(given, 1, others["memory"])
     return {**others, "codec": given}
-
-
-def _check_wanted(values: Sequence[float | str | None], stream: bool, bare: bool) -> None:
-    """Refuse more than one target, of `TARGETS`, or layout, and a target that does not go with the layout."""
-    if sum(value is not None for value in values) > 1:
-        raise SettingError(f"more than one target is given; choose one of {', '.join(TARGETS)}")
-    if stream and bare:
-        raise SettingError("stream and bare are two layouts; choose one of them")
-    if (stream or bare) and values[TARGETS.index("target_bpvf")] is not None:
-        raise SettingError("target_bpvf counts the plain layout; encode to it, then change the layout by restream")
-
-
-def _candidates(
-    codec: str | Codec | Sequence[Codec] | None, settings: dict[str, Any], purpose: str | None
-) -> Codec | Sequence[Codec]:
-    """The settings object of the one codec that is asked for, or of all to choose from."""
-    if codec is None or isinstance(codec, str):
-        return candidates(
-            codec, purpose, lambda name, own: make_codec(name, {**own, **settings}, KEYWORDS), frozenset(settings)
-        )
-    given = [codec] if isinstance(codec, Codec) else codec
-    if not (isinstance(given, list | tuple) and given) or not all(_is_settings(one) for one in given):
-        raise TypeError(f"codec is {show(codec)}; an id such as 'mcgv', a settings object or a list of those is needed")
-    check_purpose(purpose)
-    for one in given:
-        check_serves(one, purpose)
-    if settings:
-        names = ", ".join(settings)
-        raise SettingError(f"{names} beside a settings object; set it there, or give the codec's id and settings by name")
-    return codec
-
-
-def _is_settings(value: object) -> bool:
-    return isinstance(value, Codec) and not isinstance(value, type)
-
-
-def _open_source(
-    source: MeshSequence | Source,
-    path: StrPath,
-    fps: float | None,
-    options: dict[str, Any],
-) -> MeshSequence:
-    """The sequence to encode, which must not be the file to write; ``options`` are those of `read`."""
-    if isinstance(source, MeshSequence):
-        frames = options["frames"]
-        source = source if frames is None else source.part(*frame_range(source, *frames))
-        source = source if options["warp"] is None else warped(source, options["warp"])
-        return source if fps is None else source.with_fps(fps)
-    if not isinstance(source, list | tuple):
-        check_path(source, "gvpipe.encode's source", "a MeshSequence or ")
-    if _is_among(path, source):
-        raise InputError(f"{path} is the input too, which it would replace with a coarser copy; choose another name")
-    return read(source, fps, **options)
-
-
-def _open_with_inside(
-    source: MeshSequence | Source, path: StrPath, fps: float | None, options: dict[str, Any], volume: bool | None
-) -> tuple[MeshSequence, bool, tuple[str, ...]]:
-    """The sequence to encode, whether its volume is left out where it costs too much, and a note on what was chosen by now."""
-    from gvpipe.asset_coding.volume_choice import MOST_NUMBERS, count_note, times_the_surface, without_volume
-
-    sequence = _open_source(source, path, fps, {**options, "volume": bool(volume)})
-    if volume is False:
-        return without_volume(sequence), False, ()
-    times = times_the_surface(sequence)
-    if volume or isinstance(source, MeshSequence) or times is None or sequence.volume is not None:
-        return sequence, False, ()
-    if times > MOST_NUMBERS:
-        return sequence, False, (count_note(times),)
-    try:
-        return read(source, fps, **{**options, "volume": True}), True, ()
-    except InputError:  # of what lies inside alone
-        return sequence, False, ()
-
-
-@contextlib.contextmanager
-def _segments_coded_by(
-    executor: Executor | None, sequence: MeshSequence, source: MeshSequence | Source, options: dict[str, Any], is_shared: bool
-) -> Iterator[None]:
-    """Let an executor code segments of a sequence that was read from ``source`` with the ``options`` of `read`.
-
-    ``is_shared``: not before they prove to be much work.
-    """
-    if executor is None:
-        yield
-        return
-    reopen = None if isinstance(source, MeshSequence) else partial(read, _absolute(source), **options)
-    if reopen and options["mesh"] is not None:
-        reopen = partial(reopen, mesh=_absolute(options["mesh"]))
-    remote = RemoteSegments(executor, sequence, reopen)
-    with segments_mapped_by(SharedSegments(remote) if is_shared else remote):
-        yield
-
-
-def _may_share(given: Codec | Sequence[Codec], source: MeshSequence | Capture | Source) -> bool:
-    """Whether workers may code segments: of a source that they can read, by a codec whose segments are independent."""
-    is_path = not isinstance(source, MeshSequence | Capture)
-    return isinstance(given, Codec) and given.maps_segments and is_path and count_cores() > 1
-
-
-def _absolute(source: Source) -> Source:
-    """The same paths for processes whose current folder is another."""
-    if isinstance(source, list | tuple):
-        return [_absolute_path(one) for one in source]
-    return _absolute_path(check_path(source, "the input"))
-
-
-def _absolute_path(path: StrPath) -> StrPath:
-    return path if is_remote(path) or is_stored(path) else os.path.abspath(path)
-
-
-def _target(
-    sequence: MeshSequence, rmse: float | None, kg: float | None, bpvf: float | None, bound: float | str | None
-) -> Target | None:
-    """The one target that is given."""
-    for measure, value in (("rmse", rmse), ("kg", kg), ("bpvf", bpvf)):
-        if value is not None:
-            return Target(measure, value)
-    return None if bound is None else Target("max", parse_bound(bound, sequence))
-
-
-@dataclass(frozen=True)
-class _Coded:
-    """The bitstream to write, its codec, how to check its file, what was tried for it and why, and its errors if measured."""
-
-    codec: Codec
-    encoded: Encoded
-    check: Callable[[Bitstream], None] | None = None
-    tried: Sequence[Trial] = ()
-    reason: str = ""
-    errors: Errors | None = None
-
-
-def _code(
-    sequence: MeshSequence,
-    given: Codec | Sequence[Codec],
-    target: Target | None,
-    asset: AssetCoder,
-    is_bare: bool,
-    progress: Progress,
-) -> _Coded:
-    """Encode, at the quality that meets the target, with the codec that does so in the smallest file."""
-    if isinstance(given, Codec):
-        if target is None:
-            encoded = encode_sequence(given, sequence, progress)
-            progress("asset", 0.0)
-            return _Coded(given, dataclasses.replace(encoded, bitstream=asset.add(encoded, given)))
-        choice = meet(target, given, sequence, progress, asset=asset, is_bare=is_bare)
-    else:
-        choice = choose_codec(given, sequence, target or default_target(given), progress, asset, is_bare)
-    trial = choice.trial
-    check = partial(choice.trials.check, trial.encoded.permutation)
-    encoded = dataclasses.replace(trial.encoded, bitstream=asset.add(trial.encoded, trial.codec))
-    return _Coded(trial.codec, encoded, check, choice.tried, choice.reason, trial.errors)
-
-
-def _write(sequence: MeshSequence, coded: _Coded, path: StrPath, progress: Progress, layout: str) -> tuple[int, Bitstream]:
-    """Write the file with its poster, unless it is bare, and origin; return its bytes and what it holds."""
-    progress("write", 0.0)
-    bitstream = coded.encoded.bitstream
-    if not bitstream.video and layout != BARE:
-        bitstream = dataclasses.replace(bitstream, video=poster_of(sequence))
-    x, y, z = sequence.origin.tolist()
-    bitstream = dataclasses.replace(bitstream, origin=(x, y, z), is_bare=layout == BARE)
-    return write_file(bitstream, path, coded.check, segment_parts(bitstream) if layout == STREAM else None), bitstream
-
-
-def _notes(sequence: MeshSequence, target: Target | None, plan: Plan) -> list[str]:
-    """What a user should know, a line each."""
-    diagonal = frame_diagonal(sequence)
-    loose = notes.loose_bound(target.value, diagonal) if target and target.measure == "max" else ()
-    rounded = notes.rounded(sequence.rounding, diagonal)
-    said = [*loose, *rounded, *notes.whole_numbers(plan.whole), *notes.not_carried(sorted(plan.left_out))]
-    return [*sequence.notes, *said, *alpha_notes(plan.images)]
-
-
-def _refusal(path: StrPath, bitstream: Bitstream, size: int) -> list[str]:
-    """A note if the file that was written is refused without ``unlimited``; looked at where vertices are many for its size."""
-    budget, n_vertices = Budget(size), bitstream.n_vertices
-    costly = COSTLY_ATTRIBUTES if ASSET_SECTION in bitstream.sections else COSTLY_VERTEX
-    slow = codec_class(bitstream.codec).seconds_per_vertex
-    if costly * n_vertices < budget.memory and slow * n_vertices < budget.seconds:
-        return []
-    try:
-        with Player(path) as video:
-            _ = video[0], [*video.attributes.values()], [field[0:1] for field in video.fields.values()]
-    except OverBudget as exc:
-        return [notes.over_budget(exc.asked)]
-    return []
-
-
-def _is_among(path: StrPath, source: MeshSequence | Capture | Source) -> bool:
-    """Whether the output is one of the inputs."""
-    if isinstance(source, MeshSequence | Capture) or not os.path.exists(path):
-        return False
-    sources = [source] if isinstance(source, str | os.PathLike) else source
-    return any(os.path.exists(one) and os.path.samefile(one, path) for one in sources)

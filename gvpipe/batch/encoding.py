@@ -18,7 +18,7 @@ from gvpipe.foundation.isolation.plain_files import open_plain
 from gvpipe.tasks.executor import Work
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report
+    from gvpipe.encoding.report import Report
 
 BLOCK = 1 << 20  # bytes that are hashed at a time
 

@@ -32,7 +32,7 @@ from gvpipe.foundation.errors import GvpipeError, InputError, TopologyChange
 from gvpipe.foundation.text import escaped
 
 if TYPE_CHECKING:
-    from gvpipe.api import Report
+    from gvpipe.encoding.report import Report
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
