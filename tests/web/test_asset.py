@@ -227,13 +227,14 @@ def test_fields_equal_pythons(placement: str, module: Module, site: Site, monkey
 
 
 @pytest.mark.parametrize("codec", ["mcgv", "pca"])
-def test_a_browser_that_lacks_something(codec: str, module: Module, site: Site) -> None:
+def test_a_browser_that_lacks_something(codec: str, module: Module, browser: Any, site: Site) -> None:
     """Without workers the page decodes; without SIMD in WebAssembly a file is refused, and the message says why."""
     sequence = rebuilt(waving(5, 4), fields={"heat": np.arange(100.0).reshape(4, 25)})
     gvpipe.encode(sequence, site[0] / "x.mp4", codec, fields={"heat": "exact"})
     look = """const video = await GeometryVideo.load(args[0]);
         return [video.notes, (await video.fields.get("heat").frame(2))[24], (await video.frame(3)).length];"""
     assert module("delete window.Worker;" + look, address(site[0] / "x.mp4")) == [[], 74, 75]
+    browser.get(f"{site[1]}/module.html")  # a page asks once
     refused = "WebAssembly.validate = () => false;" + KIND
     assert module(refused, address(site[0] / "x.mp4")) == f"unsupported: {NO_SIMD}"
 
