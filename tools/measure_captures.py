@@ -1,11 +1,13 @@
 """Seconds to write a capture of many short shots in each format, and to read it back: a shot for each frame.
 
-Usage: python tools/measure_captures.py [FRAMES...]   prints a Markdown table
+    python tools/measure_captures.py [FRAMES...]
+
+It prints a Markdown table.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 import time
 from pathlib import Path
@@ -29,7 +31,9 @@ def sheet(side: int, height: float) -> MeshSequence:
 
 def main() -> None:
     """Print a row for each format, with two columns for each number of frames."""
-    counts = [int(given) for given in sys.argv[1:]] or [100, 300]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("counts", nargs="*", type=int, default=[100, 300], metavar="FRAMES")
+    counts = parser.parse_args().counts
     print("| format | " + " | ".join(f"write {n} | read {n}" for n in counts) + " |")
     print("| --- |" + " --- | --- |" * len(counts))
     for output in OUTPUTS:

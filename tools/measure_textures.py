@@ -22,7 +22,7 @@ SEED = 1
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure moving textures.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", type=int, default=1024)
     parser.add_argument("--frames", type=int, default=40)
     options = parser.parse_args()
