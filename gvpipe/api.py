@@ -24,7 +24,7 @@ from gvpipe.container.mp4 import bytes_by_part, load, read_file, write_file
 from gvpipe.container.shots import copy_shots
 from gvpipe.container.sources import check_target, check_video_target
 from gvpipe.encoding.capture import CaptureRequest, encode_capture
-from gvpipe.encoding.inputs import is_among, may_share, open_with_inside, segments_coded_by, some_frames
+from gvpipe.encoding.inputs import is_among, may_share, open_with_inside, segments_coded_by
 from gvpipe.encoding.report import Report, StageClock
 from gvpipe.encoding.request import LAYOUTS, TARGETS, Request, check_wanted, chosen_codecs, one_target
 from gvpipe.encoding.sequence import code_sequence, coding_notes, refusal_notes, write_coded
@@ -33,7 +33,7 @@ from gvpipe.foundation.cores import count_cores
 from gvpipe.foundation.errors import InputError, SeveralShots, TopologyChange, in_file
 from gvpipe.foundation.progress import Progress
 from gvpipe.media.sound import Sound
-from gvpipe.model.capture import Capture
+from gvpipe.model.capture import Capture, some_frames
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 from gvpipe.playback.capture_player import CapturePlayer
@@ -180,15 +180,18 @@ def encode(
     first_kernels.expect(given.id if isinstance(given, Codec) else given[0].id)
     clock = StageClock(progress)
     layout = STREAM if stream else BARE if bare else PLAIN
+    beside = AssetOptions.of(attributes, fields, textures, moving)
+
+    def encode_shots(capture: Capture) -> Report:
+        capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
+        wanted = CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
+        return encode_capture(capture, wanted, path, clock)
+
     with open_executor(scheduler, workers) as executor:
         options: dict[str, Any] = {"clip": clip, "mesh": mesh, "frames": frames, "unlimited": unlimited}
         options |= {"real_time": real_time, "warp": warp}
-        beside = AssetOptions.of(attributes, fields, textures, moving)
         if isinstance(source, Capture):
-            capture = some_frames(source, frames, fps)
-            capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
-            wanted = CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
-            return encode_capture(capture, wanted, path, clock)
+            return encode_shots(some_frames(source, frames, fps))
         try:
             sequence, spares_volume, chosen = open_with_inside(source, path, fps, options, volume)
             sequence = with_sound(sequence, sounds, frames)
@@ -203,10 +206,7 @@ def encode(
         except TopologyChange:
             if isinstance(source, MeshSequence):
                 raise
-            capture = read_capture(source, fps, **{**options, "volume": bool(volume)})
-            capture = capture if texture is None else add_texture_to_shots(capture, texture, frames)
-            wanted = CaptureRequest(request, beside, sounds, frames, memory, layout, track, vertices)
-            return encode_capture(capture, wanted, path, clock)
+            return encode_shots(read_capture(source, fps, **{**options, "volume": bool(volume)}))
     size, bitstream = write_coded(sequence, coded, path, clock, layout)
     clock("", 1.0)
     chosen += () if asset.volume_choice is None else (asset.volume_choice.note,)

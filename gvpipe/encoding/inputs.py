@@ -61,12 +61,6 @@ def open_with_inside(
         return sequence, False, ()
 
 
-def some_frames(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:
-    """Some frames of a capture, at another rate."""
-    capture = capture if frames is None else capture.part(*frames)
-    return capture if fps is None else capture.with_fps(fps)
-
-
 @contextlib.contextmanager
 def segments_coded_by(
     executor: Executor | None, sequence: MeshSequence, source: MeshSequence | Source, options: dict[str, Any], is_shared: bool

@@ -122,6 +122,12 @@ class Capture:
         return Capture(shots, self.name, self.lengths, fps, self.sound)
 
 
+def some_frames(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:
+    """Some frames of a capture, at another rate."""
+    capture = capture if frames is None else capture.part(*frames)
+    return capture if fps is None else capture.with_fps(fps)
+
+
 class LazyShots(Sequence[MeshSequence]):
     """Shots that are made when they are asked for, and not kept.
 

@@ -58,6 +58,8 @@ class CapturePlayer:
             self.fps, self.n_bytes = bitstream.fps, bitstream.n_bytes
         else:
             self.lengths, self.fps, self.n_bytes = self.index.frames, self.index.fps, self.index.size
+        shots = LazyShots(len(self.lengths), lambda number: self.shot(number).sequence())
+        self._row = Capture(shots, self.path, self.lengths, self.fps, self.sound)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(type(self), unlimited=self._unlimited), (self._absolute,)
@@ -95,8 +97,7 @@ class CapturePlayer:
 
     def capture(self) -> Capture:
         """The shots as sequences, whose frames are decoded when they are read."""
-        shots = LazyShots(len(self.lengths), lambda number: self.shot(number).sequence())
-        return Capture(shots, self.path, self.lengths, self.fps, self.sound)
+        return self._row
 
     @property
     def sound(self) -> Sound | None:
@@ -119,7 +120,7 @@ class CapturePlayer:
         return self.capture().frame(frame)
 
     def __len__(self) -> int:
-        return sum(self.lengths)
+        return len(self._row)
 
     def __getitem__(self, frame: int, /) -> Float32:
         number, own = self.capture().locate(frame)

@@ -191,14 +191,12 @@ def read_capture(
         InputError, FormatError: the path or what it holds cannot be used.
     """
     from gvpipe.io.runs import at_one_rate
-    from gvpipe.model.capture import Capture
+    from gvpipe.model.capture import Capture, some_frames
 
     if is_video(path) and clip is None and mesh is None and warp is None:
         from gvpipe.playback.capture_player import CapturePlayer
 
-        given = CapturePlayer(path, unlimited=unlimited).capture()
-        given = given if frames is None else given.part(*frames)
-        return given if fps is None else given.with_fps(fps)
+        return some_frames(CapturePlayer(path, unlimited=unlimited).capture(), frames, fps)
     how: dict[str, Any] = {"unlimited": unlimited, "real_time": real_time, "warp": warp, "volume": volume}
     runs = read_runs(path, fps, clip, mesh, frames, **how)
     name = path if isinstance(path, str | os.PathLike) else path[0]

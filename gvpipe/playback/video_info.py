@@ -12,6 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
+from gvpipe.asset.metadata import losses_of
 from gvpipe.asset_coding.directory import read_directory
 from gvpipe.asset_coding.listing import list_asset
 from gvpipe.container.bitstream import SHOTS, Bitstream
@@ -99,36 +100,31 @@ def _capture_info(path: StrPath, unlimited: bool) -> Info:
     from gvpipe.playback.capture_player import CapturePlayer
 
     with CapturePlayer(path, unlimited=unlimited) as video:
-        found = [_info(shot.bitstream, shot.outline(), shot.path) for shot in video.shots]
-        starts, sizes, size, sound = video.starts, video.shot_bytes, video.n_bytes, video.sound
-        beside = () if video.index is None else video.index.companions
-    sections = sum((Counter({**each.sections, "container": 0}) for each in found), Counter[str]())
-    for companion in beside:
-        sections[companion.kind] += companion.n_bytes
-    n_samples = sum(each.vertices * each.frames for each in found)
-    rows = [
-        {
-            "start": start,
-            "frames": each.frames,
-            "vertices": each.vertices,
-            "triangles": each.triangles,
-            "codec": each.codec,
-            "bytes": n_bytes,
-        }
-        for start, n_bytes, each in zip(starts, sizes, found, strict=True)
-    ]
+        first = _info(video.shot(0).bitstream, video.shot(0).outline(), video.shot(0).path)
+        rows, sections, said, left_out = list[dict[str, Any]](), Counter[str](), list[str](), list[str]()
+        for shot, start, n_bytes in zip(video.shots, video.starts, video.shot_bytes, strict=True):
+            bitstream = shot.bitstream
+            counts = {"frames": bitstream.n_frames, "vertices": bitstream.n_vertices, "triangles": bitstream.n_triangles}
+            rows.append({"start": start, **counts, "codec": bitstream.codec, "bytes": n_bytes})
+            sections.update({**bytes_by_part(bitstream, bitstream.n_bytes), "container": 0})
+            said += shot.notes
+            left_out += losses_of(shot.directory.metadata)
+        size, sound = video.n_bytes, video.sound
+        for companion in () if video.index is None else video.index.companions:
+            sections[companion.kind] += companion.n_bytes
+    n_samples = sum(row["vertices"] * row["frames"] for row in rows)
     return dataclasses.replace(
-        found[0],
+        first,
         layout=SHOTS,
         audio=None if sound is None else sound.to_json(),
-        vertices=max(each.vertices for each in found),
-        triangles=max(each.triangles for each in found),
-        frames=sum(each.frames for each in found),
+        vertices=max(row["vertices"] for row in rows),
+        triangles=max(row["triangles"] for row in rows),
+        frames=sum(row["frames"] for row in rows),
         bytes=size,
         bpvf=8 * size / n_samples,
-        sections={**sections, "container": size - sections.total()},
-        notes=list(dict.fromkeys(note for each in found for note in each.notes)),
-        not_carried=list(dict.fromkeys(name for each in found for name in each.not_carried)),
+        sections={**+sections, "container": size - sections.total()},
+        notes=list(dict.fromkeys(said)),
+        not_carried=list(dict.fromkeys(left_out)),
         shots=rows,
     )
 

@@ -16,8 +16,8 @@ import numpy as np
 from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.alembic.archive import EXTRA
-from gvpipe.io.alembic.param_writer import ParamWriter, filled, is_held, param_types
-from gvpipe.io.alembic.writer import BYTES, Tree, face_sets, field_rows, held_layers, notes_of, turned_corners
+from gvpipe.io.alembic.param_writer import ParamWriter, filled, param_types
+from gvpipe.io.alembic.writer import Tree, face_sets, field_rows, held_layers, notes_of, turned_corners, write_samples
 from gvpipe.io.library.writing_process import write_by
 from gvpipe.io.library.writing_worker import AskedShots
 from gvpipe.io.scene.export import ExportMesh, export_meshes
@@ -76,28 +76,12 @@ class CaptureArchive:
             own.append(self._meshes[key])
         for writer, mesh in zip(own, exported, strict=True):
             writer.begin(shot, mesh, normals)
-        self._write_frames(shot, normals, own)
+        write_samples(shot, normals, own)
         self._n_frames += len(shot)
         said = [note for writer in own for note in writer.notes]
         for writer in self._meshes.values():
             writer.pad(self._n_frames)
         return [*said, *notes_of(shot, exported, normals, self._tree.renamed)]
-
-    def _write_frames(self, shot: MeshSequence, normals: SceneNormals, writers: list[ChangingMesh]) -> None:
-        for first, block in shot.chunks():
-            for i, frame in enumerate(block):
-                turned = normals.of(first + i, frame)
-                whole = (frame + shot.origin).astype(np.float32) if shot.origin.any() else frame
-                for writer in writers:
-                    writer.write(whole, turned)
-        for name, field in normals.fields.items():
-            if not is_held(field.kind, field.n_components):
-                continue
-            step = max(1, BYTES // (4 * field.shape[1] * field.n_components))
-            for first in range(0, len(field), step):
-                block = field.read(first, min(first + step, len(field)))
-                for writer in writers:
-                    writer.write_field(name, field.kind, field.domain, block)
 
 
 @dataclass

@@ -7,14 +7,14 @@ sets of their names.
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from gvpipe.foundation import notes
-from gvpipe.foundation.arrays import Array, Int32, Int64
+from gvpipe.foundation.arrays import Array, Float32, Int32, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import not_held
 from gvpipe.io.alembic.archive import EXTRA
@@ -66,6 +66,20 @@ def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: Sc
     sampling = AbcCoreAbstract.TimeSampling(1.0 / sequence.fps, float(sequence.metadata.start_time))
     tree = Tree(archive.getTop())
     writers = [MeshWriter(tree, mesh, sequence, normals, sampling) for mesh in meshes]
+    write_samples(sequence, normals, writers)
+    return tree.renamed
+
+
+class SampleWriter(Protocol):
+    """What takes the samples of a mesh, one frame after the other."""
+
+    def write(self, positions: Float32, normals: Float32 | None) -> None: ...
+
+    def write_field(self, name: str, kind: str, domain: str, block: Array) -> None: ...
+
+
+def write_samples(sequence: MeshSequence, normals: SceneNormals, writers: Sequence[SampleWriter]) -> None:
+    """Give all writers each frame of a sequence, in world space, and then each block of its fields that Alembic holds."""
     for first, block in sequence.chunks():
         for i, frame in enumerate(block):
             turned = normals.of(first + i, frame)
@@ -80,7 +94,6 @@ def _write_archive(sequence: MeshSequence, meshes: list[ExportMesh], normals: Sc
             block = field.read(first, min(first + step, len(field)))
             for writer in writers:
                 writer.write_field(name, field.kind, field.domain, block)
-    return tree.renamed
 
 
 class Tree:
