@@ -6,6 +6,7 @@ import io
 from dataclasses import dataclass, replace
 from typing import Self
 
+from gvpipe.asset.grey import eight_bits
 from gvpipe.asset.material import Image
 from gvpipe.asset_coding.moving_textures import SmallerPictures
 from gvpipe.foundation.errors import InputError, SettingError
@@ -61,7 +62,7 @@ def limit_image(image: Image, limit: TextureLimit) -> Image:
             is_small = not limit.side or max(opened.size) <= limit.side
             if is_small and limit.format in ("", image.media_type.removeprefix("image/")):
                 return image
-            picture: Pillow.Image = opened.convert("RGBA" if opened.has_transparency_data else "RGB")
+            picture: Pillow.Image = eight_bits(opened).convert("RGBA" if opened.has_transparency_data else "RGB")
     except (OSError, ValueError, SyntaxError, Pillow.DecompressionBombError) as exc:
         raise InputError(
             f"image {image.name!r} cannot be opened ({exc}); leave out the limit of textures, or export it"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gvpipe.asset.grey import eight_bits
 from gvpipe.asset.material import MAX_SIDE, image_size
 from gvpipe.foundation.arrays import UInt8
 from gvpipe.foundation.errors import InputError
@@ -122,10 +123,7 @@ def _pixels(data: bytes, path: Path, size: tuple[int, int]) -> UInt8:
                 raise InputError(
                     f"{path} has {opened.width}x{opened.height} pixels now, and had {size[0]}x{size[1]}; read it again"
                 )
-            if opened.mode.startswith("I;16"):
-                grey = (np.asarray(opened, np.uint16) >> 8).astype(np.uint8)
-                return np.ascontiguousarray(np.repeat(grey[:, :, None], 3, axis=2))
-            return np.asarray(opened.convert("RGB"))
+            return np.asarray(eight_bits(opened).convert("RGB"))
     except InputError:
         raise
     except Exception as exc:  # damaged files raise nearly anything inside Pillow

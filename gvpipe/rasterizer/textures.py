@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvpipe.asset.grey import grey_levels
 from gvpipe.asset.material import Image
 from gvpipe.asset.moving import Pictures
 from gvpipe.foundation.arrays import Array, Float32, Int32, Int64
@@ -72,8 +73,8 @@ def decode_image(image: Image, side: int = MAX_SIDE) -> Array | str:
             width, height = opened.size
             if width * height > MAX_PIXELS:
                 return f"has {width} x {height} pixels; at most {MAX_PIXELS} are drawn"
-            if opened.mode.startswith("I;16"):
-                grey = np.asarray(opened, np.uint16)
+            grey = grey_levels(opened)
+            if grey is not None:
                 return _halved_to_fit(np.dstack([grey, grey, grey, np.full_like(grey, FULL)]), side)
             return _halved_to_fit(np.asarray(opened.convert("RGBA")), side)
     except Exception:  # damaged files raise nearly anything inside Pillow

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from gvpipe.asset.grey import eight_bits
 from gvpipe.asset.material import Image, Texture
 from gvpipe.asset.moving import Pictures
 from gvpipe.foundation.errors import InputError
@@ -156,7 +157,7 @@ def _merge(metallic: tuple[Image, str] | None, roughness: tuple[Image, str] | No
         if given is None:
             continue
         try:
-            picture = Pillow.open(io.BytesIO(given[0].data)).convert("RGBA")
+            picture = eight_bits(Pillow.open(io.BytesIO(given[0].data))).convert("RGBA")
         except Exception:  # damaged pictures raise nearly anything inside Pillow
             return None
         planes[channel] = picture.getchannel(CHANNELS.get(given[1], 0))
@@ -173,7 +174,8 @@ def _has_neutral(image: Image, channel: str) -> bool:
     from PIL import Image as Pillow
 
     try:
-        low, _ = Pillow.open(io.BytesIO(image.data)).convert("RGB").getchannel(CHANNELS[channel]).getextrema()
+        picture = eight_bits(Pillow.open(io.BytesIO(image.data))).convert("RGB")
+        low, _ = picture.getchannel(CHANNELS[channel]).getextrema()
     except Exception:
         return False
     return bool(low == 255)
