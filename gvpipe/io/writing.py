@@ -75,7 +75,7 @@ def write(
     check_target(path)
     suffix = Path(path).suffix.lower()
     if compress not in COMPRESSIONS:
-        raise SettingError(f"compress is {show(compress)}; {', '.join(map(repr, COMPRESSIONS[:-1]))} or {COMPRESSIONS[-1]!r} is needed")
+        raise SettingError(f"compress is {show(compress)}; 'none', 'meshopt' or 'draco' is needed")
     if sequence.sound is not None:
         left = "the sound is left out, for which mesh files have no place; gvpipe decode writes it beside them"
         return (*write(sequence.with_sound(None), path, start, skin, compress), left)

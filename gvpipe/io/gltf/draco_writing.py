@@ -9,8 +9,8 @@ texture coordinates      16 bits, in 0..1; others as float32                    
 others                   what they are; integers with a sign as float32                         nothing
 =======================  =====================================================================  ==================
 
-Edgebreaker gives vertices another order, and a vertex for each side where triangles meet in a point alone. Morph targets are not
-compressed and have the mesh's order, so meshes that have some are coded in order (Draco's sequential method), which takes more bytes.
+Edgebreaker gives vertices another order. Morph targets are not compressed and have the mesh's order. So meshes that have some
+are coded in order (Draco's sequential method), which takes more bytes.
 
 Source: Khronos, KHR_draco_mesh_compression; the bytes are those of Google's Draco library.
 """
@@ -30,7 +30,7 @@ from gvpipe.io.gltf.quantizing import quantized
 
 DRACO = "KHR_draco_mesh_compression"
 MORPHED = "Draco compresses meshes, not morph targets; these are as large as without it, and meshopt compresses them, too"
-NOT_HELD = "Draco holds no mesh of this file as finely as its error asks for, so that none is compressed; meshopt compresses them"
+NOT_HELD = "Draco holds no mesh of this file as finely as its error asks for: none is compressed; meshopt compresses them"
 LEVEL = 7  # of Draco's ten; ten gains half a percent, and is slower to decode
 NORMAL_BITS = 10
 MOST_BITS = 22  # of positions: Draco's time and memory grow with their range
@@ -91,7 +91,7 @@ def add_primitive(
     decoded = _decoded(data) if data else {}
     if not decoded or (in_order and not _is_in_order(decoded, given, corners, fine)):
         return None
-    ids = {name: number for name, number in generic.items()} | {"POSITION": decoded[POSITION][0]}
+    ids = {**generic, "POSITION": decoded[POSITION][0]}
     shown = decoded[POSITION][1]
     accessors = {"POSITION": glb.outside(shown, bounds=True)}
     if "NORMAL" in forms:
@@ -129,7 +129,11 @@ def _encode(
     kept = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     if not kept.any():
         return b""
-    normals = {"normals": forms["NORMAL"].values.astype(np.float64), "normal_quantization_bits": NORMAL_BITS} if "NORMAL" in forms else {}
+    more: dict[str, Any] = {}
+    if "NORMAL" in forms:
+        more = {"normals": forms["NORMAL"].values.astype(np.float64), "normal_quantization_bits": NORMAL_BITS}
+    if generic:
+        more["generic_attributes"] = {number: np.ascontiguousarray(forms[name].values) for name, number in generic.items()}
     try:
         return bytes(
             DracoPy.encode(
@@ -140,8 +144,7 @@ def _encode(
                 quantization_origin=fine.origin,
                 compression_level=LEVEL,
                 preserve_order=in_order,
-                generic_attributes={number: np.ascontiguousarray(forms[name].values) for name, number in generic.items()} or None,
-                **normals,
+                **more,
             )
         )
     except Exception:  # DracoPy's own and bare ones; each means: not this way

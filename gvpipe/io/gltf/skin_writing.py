@@ -96,9 +96,7 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
         else:
             lattice = None
     rounding = limit / _stretch(skin, np.arange(len(skin.bind))) if glb.is_draco else 0.0
-    written = write_scene(
-        glb, prepared, positions, shown, is_skinned=True, step=rounding, is_morphed=len(skin.shapes) > 0
-    )
+    written = write_scene(glb, prepared, positions, shown, is_skinned=True, step=rounding, is_morphed=len(skin.shapes) > 0)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
     unit = 1.0 if lattice is None else lattice.step
