@@ -123,8 +123,10 @@ def prepare(given: Any, error: float | str, progress: Progress | None = None, *,
         raise TypeError(f"gvpipe.show was given {show(given)}; a path, a Player, a MeshSequence or a Capture is needed")
     known = _encodings.setdefault(given, {})
     if error not in known:
-        is_row = isinstance(given, Capture)
-        known[error] = _encoded_row(given, error, progress) if is_row else _encoded(given, error, progress)
+        if isinstance(given, Capture):
+            known[error] = _encoded_row(given, error, progress)
+        else:
+            known[error] = _encoded(given, error, progress)
     return known[error]
 
 
