@@ -19,6 +19,8 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step
 
+FINER = 2  # finer steps for a blend alone, the second where the first nearly met the target error
+
 
 def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
@@ -104,8 +106,11 @@ def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> 
     trial = trials.alone(step)
     if cost(trial) > cost(whole):
         return False
-    if trial.error > target_error:
-        trial = trials.alone(step * (TUNING.bare_finer * target_error / trial.error) ** (1 / SLOPE))
+    for _ in range(FINER):
+        if trial.error > target_error:
+            trial = trials.alone(trial.step * (TUNING.bare_finer * target_error / trial.error) ** (1 / SLOPE))
+        if trial.error > TUNING.nearly * target_error:
+            break
     return trial.error <= target_error
 
 
