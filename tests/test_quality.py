@@ -73,7 +73,7 @@ def test_bytes_rise_and_errors_fall(codec: str, settings: dict[str, Any], name: 
 @pytest.mark.parametrize(
     ("codec", "settings"),
     [
-        pytest.param("mcgv", {"prediction": "affine", "placement": "halves"}, id="mcgv"),
+        pytest.param("mcgv", {"prediction": "affine", "placement": "halves"}, id="mcgv", marks=pytest.mark.slow),
         pytest.param("mcgv", {"prediction": "affine", "image": "jpeg"}, id="mcgv jpeg", marks=pytest.mark.slow),
         pytest.param("pdct", {}, id="pdct"),
     ],
