@@ -48,7 +48,7 @@ GROWTH = (
     (0, 2**0.5),
 )  # from one number tried to the next, by how many times its clusters' cost all costs
 ROUNDS = 3  # steps tried
-AIM = 0.88  # of the target error, what a blend is to leave: coding adds to it
+AIM = 0.78  # of the target error, what a blend is to leave: coding adds to it
 CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
