@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from gvpipe.asset.attribute import Attribute
-from gvpipe.asset.material import Material
+from gvpipe.asset.material import Material, with_uv
 from gvpipe.asset.moving import png_of
 from gvpipe.asset.part import Part
 from gvpipe.asset.placement import from_upper_left
@@ -29,7 +29,7 @@ from gvpipe.runtime.ahead import run_ahead
 COLOUR = "color"
 UV = "uv"
 IMAGE = "colours"
-PER_VERTEX = 6.0  # texels for each vertex of a frame whose vertices have the colours
+PER_VERTEX = 16.0  # texels for each vertex of a frame whose vertices have the colours: a video has a quarter as many of hue
 MOST_TEXELS = 1 << 24  # of an atlas: 4096 x 4096
 BLOCK = 1 << 16  # texels that are painted at a time
 UNSEEN = 128  # level of texels that no triangle shows, which the coder fills
@@ -61,24 +61,23 @@ def picture_size(sequence: MeshSequence) -> tuple[int, int]:
     return max((size for size in sizes if size), default=(0, 0))
 
 
-def with_looks(sequence: MeshSequence, capture: Capture, start: int, run: Run) -> MeshSequence:
+def with_looks(sequence: MeshSequence, frames: Capture, run: Run) -> MeshSequence:
     """A followed run with the look of its frames: a material, and a texture that moves as their colours do.
 
     Args:
         sequence: the run's, positions relative to its origin.
-        capture: the frames as they came.
-        start: the frame of ``capture`` that the run counts from.
-        run: what was followed.
+        frames: of the run, as they came.
+        run: the key mesh at each of the frames.
 
     Raises:
         InputError: xatlas hung or died.
     """
     assert run.key is not None
-    key = capture.frame(start + run.key)
+    key = frames.frame(run.key - run.start)
     used = _used_materials(key)
     if not used and not has_paint(key):
         return sequence
-    material = replace(used[0], **dict.fromkeys(used[0].textures)) if used else Material(name=IMAGE, double_sided=True)
+    material = with_uv((used[0],), ())[0] if used else Material(name=IMAGE, double_sided=True)
     part = Part("", (0, sequence.n_vertices), (0, len(run.faces)), material=0)
     if not has_paint(key):
         return replace(sequence, materials=(material,), parts=(part,))
@@ -87,17 +86,16 @@ def with_looks(sequence: MeshSequence, capture: Capture, start: int, run: Run) -
     uv = Attribute(atlas.uv.astype(np.float32), "corner", "uv", atlas.corners.ravel())
     opaque = replace(material, base_color=(1.0, 1.0, 1.0, 1.0), alpha_mode="opaque")
     bare = replace(sequence, attributes={**sequence.attributes, UV: uv}, materials=(opaque,), parts=(part,))
-    frames = capture.part(start + run.start, start + run.stop)
     return with_pictures(bare, FollowedPictures(frames, sequence.origin, run, atlas), IMAGE)
 
 
 def _used_materials(frame: MeshSequence) -> list[Material]:
-    numbers = {part.material for part in frame.parts if part.triangles[0] < part.triangles[1]}
-    return [frame.materials[number] for number in sorted(numbers - {None})]  # type: ignore[type-var]
+    numbers = {part.material for part in frame.parts if part.material is not None and part.triangles[0] < part.triangles[1]}
+    return [frame.materials[number] for number in sorted(numbers)]
 
 
 def _n_texels(frame: MeshSequence) -> float:
-    """Texels of an atlas that shows the surface as finely as a frame's pictures do, or its vertices; never more than they are."""
+    """Texels of an atlas that shows the surface as finely as a frame's pictures do, or its vertices; never more than those."""
     shown = 0.0
     held: dict[int, int] = {}
     for part in frame.parts:

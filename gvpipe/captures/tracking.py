@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from gvpipe.captures.painting import left_of_looks, paint_names, picture_size, with_looks
+from gvpipe.captures.sampled_fields import sampled_fields
 from gvpipe.following import Run, follow
 from gvpipe.following.follow import MAX_ERROR, RMS
 from gvpipe.foundation.arrays import Array, Float64, Int32
 from gvpipe.foundation.notes import count
 from gvpipe.foundation.progress import Progress
+from gvpipe.io.normals.own import are_smooth
 from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
@@ -56,14 +58,20 @@ def coding_targets(targets: Targets, is_followed: bool) -> Targets:
 
 
 def is_tracked_by_default(capture: Capture) -> bool:
-    """Whether most frames have a connectivity of their own, and nothing but a colour would be lost by following."""
+    """Whether most frames have a connectivity of their own, and following loses nothing of them.
+
+    Fields would be sampled, which is not what who measures expects.
+    """
     alone = sum(length == 1 for length in capture.lengths)
-    return len(capture) > 2 and 2 * alone > len(capture) and not what_is_lost(capture.shots[0])
+    return len(capture) > 2 and 2 * alone > len(capture) and not what_is_lost(capture.shots[0]) and not capture.shots[0].fields
 
 
 def what_is_lost(shot: MeshSequence) -> list[str]:
     """What following leaves behind of a shot, by name."""
-    lost = [name for name in shot.attributes if name not in paint_names(shot)] + list(shot.fields)
+    kept, normals = paint_names(shot), shot.attributes.get("normal")
+    if normals is not None and are_smooth(normals, shot.read(0, 1)[0], shot.faces):
+        kept.add("normal")  # those of the followed surface are as good
+    lost = [name for name in shot.attributes if name not in kept]
     lost += [f"{len(shot.parts)} parts"] if len({part.name for part in shot.parts}) > 1 else []
     lost += left_of_looks(shot)
     lost += ["the volume"] if shot.volume is not None else []
@@ -115,6 +123,8 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
         )
         notes += [f"colours of each frame become textures that move, of up to {size[0]}x{size[1]} texels"] if size[0] else []
         lost = what_is_lost(capture.shots[0])
+        kept = [shot.fields for shot, key in zip(shots, keys, strict=True) if key is not None]
+        lost += [name for name in capture.shots[0].fields if not all(name in fields for fields in kept)]
         notes += [f"{SURFACE_ALONE}; left out: {', '.join(lost)}"] if lost else []
     found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
     return Tracked(found, tuple(keys), tuple(notes))
@@ -143,11 +153,13 @@ def _stretches(capture: Capture) -> Iterator[tuple[bool, list[int]]]:
 
 
 def _shot(capture: Capture, start: int, run: Run, origin: Float64) -> MeshSequence:
-    """A run of ``capture`` whose first frame is ``start + run.start``, with the colours of its frames."""
+    """A run of ``capture`` whose first frame is ``start + run.start``, with the looks and fields of its frames."""
     first = capture.frame(start + run.start)
     metadata = first.metadata
     if metadata.times:
         times = tuple(float(capture.frame(start + k).times[0]) for k in range(run.start, run.stop))
         metadata = replace(metadata, times=times)
-    bare = MeshSequence(run.positions, run.faces, capture.fps, {}, capture.name, origin, metadata=metadata)
-    return with_looks(bare, capture, start, run)
+    frames = capture.part(start + run.start, start + run.stop)
+    fields = sampled_fields(frames, origin, run)
+    bare = MeshSequence(run.positions, run.faces, capture.fps, {}, capture.name, origin, fields=fields, metadata=metadata)
+    return with_looks(bare, frames, run)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import pickle
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -44,7 +45,7 @@ def patches_of(points: Float64, faces: Int32, most: int = PATCH) -> list[Int64]:
     return [side[part] for side in sides for part in patches_of(points, faces[side], most)]
 
 
-def run_xatlas(meshes: list[Mesh], remedy: str) -> list[Charts]:
+def run_xatlas(meshes: Sequence[Mesh], remedy: str) -> list[Charts]:
     """Charts of each mesh (`gvpipe.mesh.xatlas_worker.charts_of`), found by a process for each processor.
 
     Args:
@@ -64,7 +65,7 @@ def run_xatlas(meshes: list[Mesh], remedy: str) -> list[Charts]:
     return [answers[place % n_shares][place // n_shares] for place in np.argsort(largest_first)]
 
 
-def _run(meshes: list[Mesh], remedy: str) -> list[Charts]:
+def _run(meshes: Sequence[Mesh], remedy: str) -> list[Charts]:
     """Charts of some meshes, by one process."""
     limit = SECONDS + SECONDS_TRIANGLE * sum(len(mesh[1]) for mesh in meshes)
     request = pickle.dumps(meshes, protocol=5)

@@ -15,7 +15,7 @@ from typing import Any
 MAX_COST = 8.0  # xatlas' limit for growing a chart (its default is 2): fewer, larger charts cost fewer blocks
 TEXELS_PER_UNIT = 64.0  # only a scale, where others pack the charts
 
-Mesh = tuple[Any, Any] | tuple[Any, Any, float, int]  # positions (n, 3) float32, triangles (m, 3) uint32; more of `charts_of`
+Mesh = tuple[Any, ...]  # positions (n, 3) float32, triangles (m, 3) uint32; other arguments of `charts_of`
 Charts = tuple[Any, Any, Any, Any]  # of one mesh, see `charts_of`
 _atlases: list[Any] = []  # they stay until the process ends, so that none is destroyed
 
