@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import moving
 import numpy as np
 import pytest
 from changing import SIZES, SPANS, sheet, write_objs
@@ -18,6 +20,7 @@ from sequences import grid
 import gvpipe
 from gvpipe.container.mp4 import read_index
 from gvpipe.errors import CorruptFile, FormatError, InputError, SettingError, SeveralShots, StrippedFile, TopologyChange
+from gvpipe.model.moving_texture import with_pictures
 from gvpipe.model.sequence import MeshSequence
 
 Run = Callable[..., Any]
@@ -259,6 +262,21 @@ def test_sound_of_the_whole_film(run: Run, video: Path, tmp_path: Path) -> None:
         assert opened[4].shape == (49, 3)
     ended = run("decode", tmp_path / "d.mp4", tmp_path / "out" / "%d.ply")
     assert ended.status == 0 and "sound is left out" in ended.err.replace("sound of the file", "sound")
+
+
+def test_each_frame_keeps_its_picture(tmp_path: Path) -> None:
+    """OBJ files with a material file and a picture for each frame, whose mesh changes now and then."""
+    shots = [with_pictures(moving.sheet(2), moving.pictures(5)[:2]), with_pictures(moving.sheet(3), moving.pictures(5)[2:])]
+    faces = shots[1].faces[:-1]
+    parts = [gvpipe.Part("", (0, shots[1].n_vertices), (0, len(faces)), 0)]
+    shots[1] = replace(shots[1], faces=faces, parts=parts)
+    gvpipe.write(gvpipe.Capture(shots, "sheets"), tmp_path / "in" / "%d.obj")
+    gvpipe.encode(tmp_path / "in", tmp_path / "a.mp4")
+    with gvpipe.open_capture(tmp_path / "a.mp4") as video:
+        assert video.lengths == (2, 3)
+        for frame in range(5):
+            pictures = video.frame(frame).images[0].pictures
+            assert pictures is not None and moving.is_of(pictures.pixels(0), frame)
 
 
 def test_a_surface_is_followed(tmp_path: Path) -> None:
