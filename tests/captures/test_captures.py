@@ -268,7 +268,7 @@ def test_each_frame_keeps_its_picture(tmp_path: Path) -> None:
     """OBJ files with a material file and a picture for each frame, whose mesh changes now and then."""
     shots = [with_pictures(moving.sheet(2), moving.pictures(5)[:2]), with_pictures(moving.sheet(3), moving.pictures(5)[2:])]
     faces = shots[1].faces[:-1]
-    parts = [gvpipe.Part("", (0, shots[1].n_vertices), (0, len(faces)), 0)]
+    parts = (gvpipe.Part("", (0, shots[1].n_vertices), (0, len(faces)), 0),)
     shots[1] = replace(shots[1], faces=faces, parts=parts)
     gvpipe.write(gvpipe.Capture(shots, "sheets"), tmp_path / "in" / "%d.obj")
     gvpipe.encode(tmp_path / "in", tmp_path / "a.mp4")
@@ -277,6 +277,19 @@ def test_each_frame_keeps_its_picture(tmp_path: Path) -> None:
         for frame in range(5):
             pictures = video.frame(frame).images[0].pictures
             assert pictures is not None and moving.is_of(pictures.pixels(0), frame)
+
+
+def test_meshes_of_a_glb_take_turns(run: Run, tmp_path: Path) -> None:
+    """All commands see the shots of a .glb whose meshes are shown one after the other."""
+    gvpipe.write(sheets(), tmp_path / "a.glb")
+    with pytest.raises(TopologyChange, match="meshes take turns, and at frame 3 others are shown"):
+        gvpipe.read(tmp_path / "a.glb")
+    assert gvpipe.read(tmp_path / "a.glb", frames=(3, 5)).shape == (2, 49, 3)
+    report = gvpipe.encode(tmp_path / "a.glb", tmp_path / "a.mp4")
+    assert [(row["frames"], row["vertices"]) for row in report.shots] == [(3, 25), (2, 49), (1, 16)]
+    assert "3:5" in run("info", tmp_path / "a.glb").out
+    assert run("convert", tmp_path / "a.glb", tmp_path / "out" / "%d.obj").status == 0
+    assert len(list((tmp_path / "out").iterdir())) == 6
 
 
 def test_a_surface_is_followed(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_textures_move_over_shots(player: Run, site: tuple[Path, str]) -> None:
     made = []
     for start, stop in ((0, 6), (6, 10)):
         flat = with_pictures(sheet(stop - start), pictures(stop, (63, 48))[start:], "skin")
-        made.append(flat.with_looks([replace(each, unlit=True) for each in flat.materials], flat.images).with_fps(12.0))
+        made.append(flat.with_looks(tuple(replace(each, unlit=True) for each in flat.materials), flat.images).with_fps(12.0))
     gvpipe.encode(gvpipe.Capture(made, "two"), site[0] / "textures.mp4", "pca")
     order = [0, 7, 3, 9, 5, 6, 1]
     jumps, played = player(
