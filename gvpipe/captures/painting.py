@@ -20,6 +20,7 @@ from gvpipe.following.atlas import FILLED, Atlas, make_atlas
 from gvpipe.following.places import OwnMesh
 from gvpipe.following.texels import Texels
 from gvpipe.foundation.arrays import Float64, UInt8
+from gvpipe.foundation.errors import InputError
 from gvpipe.model.capture import Capture
 from gvpipe.model.moving_texture import with_pictures
 from gvpipe.model.sequence import MeshSequence
@@ -32,6 +33,7 @@ IMAGE = "colours"
 PER_VERTEX = 16.0  # texels for each vertex of a frame whose vertices have the colours: a video has a quarter as many of hue
 MOST_TEXELS = 1 << 24  # of an atlas: 4096 x 4096
 BLOCK = 1 << 16  # texels that are painted at a time
+KEPT = "--track off keeps pictures as they are"
 UNSEEN = 128  # level of texels that no triangle shows, which the coder fills
 
 
@@ -52,6 +54,8 @@ def left_of_looks(frame: MeshSequence) -> list[str]:
     """What of a frame's materials no picture of colours can hold, by name."""
     roles = {role for each in frame.materials for role in each.textures} - {"base_color_texture"}
     lost = [role.replace("_", " ") for role in sorted(roles)]
+    shown = {each.base_color_texture.image for each in frame.materials if each.base_color_texture is not None}
+    lost += ["pictures that cannot be decoded"] if any(frame.images[number].size is None for number in shown) else []
     return lost + (["alpha"] if any(each.alpha_mode != "opaque" for each in frame.materials) else [])
 
 
@@ -155,6 +159,8 @@ class FollowedPictures:
         mesh = OwnMesh(own.read_absolute(0, 1)[0] - self._origin, own.faces)
         positions = np.asarray(self._run.positions[frame : frame + 1], np.float64)[0]
         colours = SurfaceColours(own)
+        if colours.notes:
+            raise InputError(f"{own.name}: frame {frame} of a run that is followed: {colours.notes[0]}; {KEPT}")
         result = np.full((self._atlas.height * self._atlas.width, 3), UNSEEN, np.uint8)
 
         def fill(span: slice) -> None:

@@ -13,6 +13,7 @@ from PIL import Image as Pillow
 
 import gvpipe
 from gvpipe.captures import tracking
+from gvpipe.errors import InputError
 from gvpipe.following.atlas import make_atlas
 from gvpipe.foundation.progress import silent
 from gvpipe.model.sequence import MeshSequence
@@ -119,6 +120,15 @@ def test_colours_are_those_of_each_frame(look: str, most: float, tmp_path: Path)
     assert len(as_it_came.shots) == 3
 
 
+def test_a_picture_that_cannot_be_decoded_is_named(tmp_path: Path) -> None:
+    given = [frame(number, "textures") for number in range(3)]
+    cut = gvpipe.Image("map", "image/png", given[1].images[0].data[:200])
+    given[1] = given[1].with_looks(given[1].materials, (cut,), given[1].parts)
+    with pytest.raises(InputError, match="frame 1 of a run that is followed: image 'map' .* cannot be decoded.*--track off"):
+        gvpipe.encode(gvpipe.Capture(given), tmp_path / "a.mp4")
+    assert not list(tmp_path.iterdir())
+
+
 def test_fields_are_sampled_where_that_is_asked_for() -> None:
     given = capture("fields")
     assert not tracking.is_tracked_by_default(given) and tracking.is_tracked_by_default(capture("textures"))
@@ -145,6 +155,8 @@ def test_what_following_loses_keeps_it_from_being_the_default() -> None:
     )
     assert tracking.what_is_lost(bumpy) == ["normal texture", "alpha"]
     assert material.base_color_texture is not None
+    film = gvpipe.Image("film", "image/x-exr", b"\x76\x2f\x31\x01")  # nothing here decodes it
+    assert tracking.what_is_lost(shot.with_looks(shot.materials, (film,), shot.parts)) == ["pictures that cannot be decoded"]
     with_more = MeshSequence(shot.positions, shot.faces, 25.0, {"weight": np.zeros(shot.n_vertices, np.float32)})
     assert tracking.what_is_lost(with_more) == ["weight"]
 
