@@ -102,7 +102,7 @@ def colour_error(found: MeshSequence, number: int) -> float:
     return float(np.abs(SurfaceColours(found).at(triangles, weights) - colour(points, number)).mean())
 
 
-@pytest.mark.parametrize(("look", "most"), [("textures", 3.0), ("colours", 5.0)])
+@pytest.mark.parametrize(("look", "most"), [("textures", 3.0), pytest.param("colours", 5.0, marks=pytest.mark.slow)])
 def test_colours_are_those_of_each_frame(look: str, most: float, tmp_path: Path) -> None:
     given = capture(look)
     report = gvpipe.encode(given, tmp_path / "a.mp4")
