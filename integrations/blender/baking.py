@@ -115,14 +115,22 @@ def _to_shape_keys(object_: Any, frames: Baked) -> None:
         key.interpolation = "KEY_LINEAR"
     keys = mesh.shape_keys
     keys.use_relative = False
-    edit = bpy.context.preferences.edit
-    before, edit.keyframe_new_interpolation_type = edit.keyframe_new_interpolation_type, "LINEAR"
-    try:
-        for number in dict.fromkeys((0, frames.shape[0] - 1)):
-            keys.eval_time = keys.key_blocks[number].frame
-            keys.keyframe_insert("eval_time", frame=settings.start + number / settings.speed)
-    finally:
-        edit.keyframe_new_interpolation_type = before
+    for number in dict.fromkeys((0, frames.shape[0] - 1)):
+        keys.eval_time = keys.key_blocks[number].frame
+        keys.keyframe_insert("eval_time", frame=settings.start + number / settings.speed)
+    for curve in _curves(keys.animation_data.action):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+        if settings.repeat:
+            curve.modifiers.new("CYCLES")
+
+
+def _curves(action: Any) -> list[Any]:
+    """All curves of an action; Blender 4.4 and newer have them in layers."""
+    if not hasattr(action, "layers"):
+        return list(action.fcurves)
+    strips = [strip for layer in action.layers for strip in layer.strips]
+    return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
 
 
 def _to_pc2(object_: Any, source: Source, frames: Baked, path: str) -> None:
@@ -147,12 +155,15 @@ def _to_alembic(context: Any, object_: Any, source: Source, path: str) -> None:
     object_.select_set(True)
     context.view_layer.objects.active = object_
     end = settings.start + (len(source) - 1) / settings.speed
+    moving = object_.modifiers.new("moving", "SMOOTH")  # the exporter writes one frame of objects without modifiers
+    moving.iterations = 0
     try:
         bpy.ops.wm.alembic_export(
             filepath=path, start=round(settings.start), end=round(end), selected=True, flatten=True, as_background_job=False
         )
         bpy.ops.cachefile.open(filepath=path)
     finally:
+        object_.modifiers.remove(moving)
         scene.frame_set(now)
         for each in selected:
             each.select_set(True)

@@ -66,8 +66,7 @@ class EXPORT_OT_geometry_video(bpy.types.Operator, ExportHelper):
         if self.codec != "default":
             options["codec"] = self.codec
         if self.max_error.strip():
-            text = self.max_error.strip()
-            options["max_error"] = text if text.endswith("%") else float(text)
+            options["max_error"] = self.max_error.strip()
         if self.stream:
             options["stream"] = True
         self._steps = steps(context, chosen, os.path.abspath(path), options, self.attributes)

@@ -28,15 +28,24 @@ _rebased: dict[str, str] = {}  # by name of a mesh: the absolute path of its fil
 
 def _changed(settings: Any, context: Any) -> None:
     mesh = settings.id_data
-    if context is not None and settings.filepath and not mesh.is_editmode:
+    if context is not None and mesh.name not in _rebased and settings.filepath and not mesh.is_editmode:
         follow_mesh(mesh, context.scene.frame_current)
+
+
+# of newer versions, which warn of a relative path without it; 4.2 does not know it
+KNOWN = bpy.types.Property.bl_rna.properties.keys()
+RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if "is_path_supports_blend_relative" in KNOWN else set()
 
 
 class GeometryVideo(bpy.types.PropertyGroup):
     """What a mesh follows; `Mesh.geometry_video`."""
 
     filepath: bpy.props.StringProperty(
-        name="File", description="Geometry video, or frames, that the mesh follows", subtype="FILE_PATH", update=_changed
+        name="File",
+        description="Geometry video, or frames, that the mesh follows",
+        subtype="FILE_PATH",
+        options=RELATIVE,
+        update=_changed,
     )
     start: bpy.props.FloatProperty(name="Start", description="The scene's frame that shows frame 0", default=1, update=_changed)
     speed: bpy.props.FloatProperty(
