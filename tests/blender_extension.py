@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import subprocess
 import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -90,6 +92,7 @@ def imported(folder: Path) -> Found:
         "state": values(first, "state"),
         "polygons": sum(len(each.data.polygons) for each in meshes()),
         "images": sorted(each.name for each in bpy.data.images if each.packed_file),
+        "sounds": [strip.name for strip in (scene.sequence_editor.strips if scene.sequence_editor else ())],
         "valid": [not each.data.validate(verbose=False) for each in meshes()],
     }
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "saved" / "scene.blend"))
@@ -187,7 +190,50 @@ def others(folder: Path) -> Found:
             break
     work.close()  # as Escape does
     told["stopped"] = [(folder / "stopped.mp4").exists(), scene.frame_current]
+    told["modal"] = [modal(folder, [cube], stops) for stops in (False, True)]
     return arrays, told
+
+
+def modal(folder: Path, chosen: list[Any], stops: bool) -> list[Any]:
+    """Export as a window does it, event by event, and stop it by Escape if ``stops``: how it ended, what it told."""
+    operator = sys.modules["geometry_video"].exporting.EXPORT_OT_geometry_video
+    path, told, shown = folder / f"modal{stops}.mp4", [], []
+
+    class Window:
+        """What an operator has of itself, and of its window."""
+
+        modal, _finish, _tidy, _timer = operator.modal, operator._finish, operator._tidy, None
+        window_manager = SimpleNamespace(
+            progress_update=shown.append, progress_end=lambda: None, event_timer_remove=lambda timer: None
+        )
+        workspace = SimpleNamespace(status_text_set=lambda text: None)
+
+        def report(self, kind: set[str], text: str) -> None:
+            told.append(text)
+
+    window, ended = Window(), {"RUNNING_MODAL"}
+    window._steps = sys.modules["geometry_video"].exporting.steps(bpy.context, chosen, str(path), {}, True)  # type: ignore[attr-defined]
+    while "RUNNING_MODAL" in ended:
+        is_enough = stops and shown and shown[-1] >= 40
+        ended = window.modal(window, SimpleNamespace(type="ESC" if is_enough else "TIMER"))
+    return [sorted(ended)[0], path.exists(), told, shown == sorted(shown)]
+
+
+def installed(folder: Path) -> Found:
+    """Install a zip by Blender's own operator, import by it, remove it."""
+    import addon_utils
+
+    addon_utils.enable("bl_pkg", default_set=True)
+    zip_file = str(folder / "extension.zip")
+    tool = Path(addon_utils.__file__).parents[1] / "addons_core/bl_pkg/cli/blender_ext.py"  # of `blender --command extension`
+    done = subprocess.run([sys.executable, str(tool), "validate", zip_file], capture_output=True, text=True, check=False)
+    bpy.ops.extensions.package_install_files(filepath=zip_file, repo="user_default", enable_on_install=True)
+    assert bpy.ops.import_scene.geometry_video(filepath=str(folder / "scene.mp4")) == {"FINISHED"}
+    told = {"modules": [name for name in sys.modules if name.endswith(".geometry_video")], "objects": len(meshes())}
+    told["validated"] = done.stdout + done.stderr
+    bpy.ops.extensions.package_uninstall(repo_index=1, pkg_id="geometry_video")
+    told["left"] = hasattr(bpy.types.Mesh, "geometry_video")
+    return {}, told
 
 
 def pictured(folder: Path) -> Found:
@@ -217,7 +263,7 @@ def main(step: str, folder: str) -> None:
     """Run a step in an empty scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     steps: dict[str, Callable[[Path], Found]] = {
-        each.__name__: each for each in (imported, reopened, baked, others, pictured)
+        each.__name__: each for each in (imported, reopened, baked, others, installed, pictured)
     }
     arrays, told = steps[step](Path(folder))
     np.savez(Path(folder) / f"{step}.npz", **arrays)

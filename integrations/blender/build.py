@@ -22,8 +22,8 @@ PLATFORMS = {  # Blender's name: tags of wheels, newest system first
     "macos-arm64": ("macosx_14_0_arm64", "macosx_13_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
 }
 BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", "")}  # oldest with this Python, and the first that has a newer one
-# What reading, writing, skins and OBJ, PLY, STL and GLB files import. SciPy of NumPy 1.24, which Blender 4.2 has. Left out: OpenCV
-# (JPEG pictures), readers of USD, Alembic and FBX (Blender has its own), click and rich (the command line).
+# What reading, writing, skins and OBJ, PLY, STL and GLB files import. SciPy of NumPy 1.24, which Blender 4.2 has. Left out:
+# OpenCV (JPEG pictures), readers of USD, Alembic and FBX (Blender has its own), click and rich (the command line).
 REQUIREMENTS = (
     "scipy>=1.15,<1.16",
     "numba>=0.60,<0.69",
@@ -52,7 +52,7 @@ def manifest(platform: str, python: str, wheels: Sequence[str]) -> str:
     oldest, newer = BLENDERS[python]
     text = (HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     text = re.sub(r"^#.*\n", "", text)
-    text = re.sub(r'^version = .*$', f'version = "{version()}"', text, flags=re.M)
+    text = re.sub(r"^version = .*$", f'version = "{version()}"', text, flags=re.M)
     limits = f'blender_version_min = "{oldest}"\n' + (f'blender_version_max = "{newer}"\n' if newer else "")
     text = re.sub(r"^blender_version_min = .*\n", limits, text, flags=re.M)
     rows = "".join(f'  "./wheels/{name}",\n' for name in sorted(wheels))

@@ -50,10 +50,14 @@ class EXPORT_OT_geometry_video(bpy.types.Operator, ExportHelper):
     max_error: bpy.props.StringProperty(
         name="Max Error", description="That no vertex exceeds: units of the scene, or a part of the diagonal such as 0.1%"
     )
-    attributes: bpy.props.BoolProperty(name="Attributes", description="Numbers on points and faces; fields if they move", default=True)
+    attributes: bpy.props.BoolProperty(
+        name="Attributes", description="Numbers on points and faces; fields if they move", default=True
+    )
     stream: bpy.props.BoolProperty(name="Stream Layout", description="The file plays over HTTP while it loads", default=False)
     skin: bpy.props.BoolProperty(
-        name="Skinned GLB", description="A .glb with a skeleton that moves the mesh, for every engine, in place of .mp4", default=False
+        name="Skinned GLB",
+        description="A .glb with a skeleton that moves the mesh, for every engine, in place of .mp4",
+        default=False,
     )
 
     def execute(self, context: Any) -> set[str]:
@@ -134,7 +138,9 @@ def steps(context: Any, chosen: list[Any], path: str, options: dict[str, Any], w
                 scene.frame_set(frame)
                 found = sample(context.evaluated_depsgraph_get(), names, numbered)
                 if found is None:
-                    raise ValueError(f"nothing with polygons is there at frame {frame}; select a mesh, or shorten the scene's range")
+                    raise ValueError(
+                        f"nothing with polygons is there at frame {frame}; select a mesh, or shorten the scene's range"
+                    )
                 if not takes or not takes[-1].first.has_same_surface(found):
                     takes.append(Take(found, file.tell()))
                 takes[-1].add(found, file)
@@ -148,23 +154,35 @@ def steps(context: Any, chosen: list[Any], path: str, options: dict[str, Any], w
         metadata = gvpipe.Metadata("z", scene.unit_settings.scale_length, source=f"Blender {bpy.app.version_string}")
         name = os.path.splitext(os.path.basename(path))[0]
         shots = [take.sequence(file, fps, looks, images, metadata, with_attributes, name) for take in takes]
-        stop, done = threading.Event(), ["", 0.0]
+        stop, bar = threading.Event(), Bar()
 
         def told(stage: str, part: float) -> None:
             if stop.is_set():
                 raise Cancelled
-            done[:] = [stage, part]
+            bar.show(stage, part)
 
         with ThreadPoolExecutor(1) as pool:
             work = pool.submit(_write, shots, path, options, told)
             try:
                 while not work.done():
-                    yield f"{done[0] or 'encoding'}", SAMPLED + (1 - SAMPLED) * float(done[1])
+                    yield bar.stage, SAMPLED + (1 - SAMPLED) * bar.part
                     time.sleep(0.02)
             finally:
                 stop.set()
             result: list[str] = work.result()
             return result
+
+
+class Bar:
+    """Stages of unknown number in one bar: each takes half of what is left."""
+
+    def __init__(self) -> None:
+        self.stage, self.part, self._stages = "encoding", 0.0, 0
+
+    def show(self, stage: str, part: float) -> None:
+        """Take note of the part of a stage that is done."""
+        self._stages += stage != self.stage
+        self.stage, self.part = stage, max(self.part, 1 - (1 - part / 2) * 0.5 ** max(self._stages - 1, 0))
 
 
 def _write(shots: list[Any], path: str, options: dict[str, Any], told: Any) -> list[str]:
@@ -197,9 +215,7 @@ class Take:
                 self._moving.add(name)
         self._length += 1
 
-    def sequence(
-        self, file: Any, fps: float, looks: Any, images: Any, metadata: Any, with_attributes: bool, name: str
-    ) -> Any:
+    def sequence(self, file: Any, fps: float, looks: Any, images: Any, metadata: Any, with_attributes: bool, name: str) -> Any:
         """The frames as a `gvpipe.MeshSequence` over the file: what moves is a field, what stands still an attribute."""
         import gvpipe
 

@@ -45,6 +45,8 @@ class IMPORT_OT_geometry_video(bpy.types.Operator, ImportHelper):
             return {"CANCELLED"}
         if self.set_scene:
             set_scene(context.scene, source)
+        if source.has_sound:
+            add_sound(context.scene, source)
         for object_ in context.selected_objects:
             object_.select_set(False)
         for object_ in made:
@@ -73,7 +75,7 @@ def place(context: Any, source: Source, split: bool, up: str, relative: bool) ->
     made = []
     for parts in pieces or [()]:
         part = sequence.parts[parts[0]] if parts else None
-        mesh = meshes.new_mesh(part.name if part and part.name else name)
+        mesh = bpy.data.meshes.new(part.name if part and part.name else name)
         add_slots(mesh, sequence, parts, looks)
         meshes.build(mesh, source, 0, parts, 0, up, unit)
         mesh[playing.SHOT] = 0
@@ -142,6 +144,14 @@ def set_scene(scene: Any, source: Source) -> None:
     whole = next((number for number in count(max(1, round(rate))) if number >= rate), 1)
     scene.render.fps, scene.render.fps_base = whole, whole / rate
     scene.frame_end = scene.frame_start + len(source) - 1
+
+
+def add_sound(scene: Any, source: Source) -> None:
+    """A strip of the file's sound, from the scene's first frame, in the sequencer."""
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # of Blender before 4.4
+    channel = 1 + max((strip.channel for strip in strips), default=0)
+    strips.new_sound(os.path.basename(source.path), source.path, channel, scene.frame_start)
 
 
 class IO_FH_geometry_video(bpy.types.FileHandler):

@@ -66,19 +66,15 @@ def to_blender(material: Any, images: list[Any], uv_names: dict[str, str]) -> An
 
 def colored(name: str, attribute: str) -> Any:
     """A material that shows the colours of an attribute."""
-    made = to_blender(_Plain(name), [], {})
+    import gvpipe
+
+    made = to_blender(gvpipe.Material(name, double_sided=True), [], {})
     tree = made.node_tree
     node = next(each for each in tree.nodes if each.type == "BSDF_PRINCIPLED")
     colors = tree.nodes.new("ShaderNodeVertexColor")
     colors.layer_name = attribute
     tree.links.new(colors.outputs["Color"], node.inputs["Base Color"])
     return made
-
-
-def _Plain(name: str) -> Any:
-    import gvpipe
-
-    return gvpipe.Material(name, double_sided=True)
 
 
 def image_to_blender(image: Any) -> Any:
@@ -149,43 +145,43 @@ def from_blender(given: list[Any], uv_names: dict[str, str]) -> tuple[tuple[Any,
     images: dict[str, Any] = {}
     made = []
     for material in given:
-        node = None
-        if material.node_tree:
-            node = next((each for each in material.node_tree.nodes if each.type == "BSDF_PRINCIPLED"), None)
-        if node is None:
-            made.append(gvpipe.Material(material.name, base_color=_limited(material.diffuse_color), double_sided=True))
-            continue
-        sockets = node.inputs
-        alpha = float(sockets["Alpha"].default_value)
-        strength = float(sockets["Emission Strength"].default_value)
-        values = {name: float(sockets[socket].default_value) for socket, name in NUMBERS.items() if not sockets[socket].is_linked}
-        textures = {}
-        for socket, name in (("Base Color", "base_color_texture"), ("Emission Color", "emissive_texture")):
-            if (picture := _picture(sockets[socket])) and (texture := _texture(picture, images, uv_names)):
-                textures[name] = texture
-        if sockets["Normal"].is_linked:
-            bump = sockets["Normal"].links[0].from_node
-            if bump.type == "NORMAL_MAP" and (picture := _picture(bump.inputs["Color"])):
-                textures["normal_texture"] = _texture(picture, images, uv_names)
-        if sockets["Roughness"].is_linked and sockets["Metallic"].is_linked:
-            split = sockets["Roughness"].links[0].from_node
-            if split.type == "SEPARATE_COLOR" and (picture := _picture(split.inputs["Color"])):
-                textures["metallic_roughness_texture"] = _texture(picture, images, uv_names)
-                values |= {"metallic": 1.0, "roughness": 1.0}
-        base = (1.0, 1.0, 1.0) if sockets["Base Color"].is_linked else tuple(sockets["Base Color"].default_value)[:3]
-        emission = (1.0, 1.0, 1.0) if sockets["Emission Color"].is_linked else tuple(sockets["Emission Color"].default_value)[:3]
-        made.append(
-            gvpipe.Material(
-                material.name,
-                base_color=_limited((*base, alpha)),
-                emissive=tuple(strength * each for each in emission) if strength else (0.0, 0.0, 0.0),
-                alpha_mode="blend" if alpha < 1 or sockets["Alpha"].is_linked else "opaque",
-                double_sided=not material.use_backface_culling,
-                **values,
-                **{name: texture for name, texture in textures.items() if texture},
-            )
-        )
+        nodes = material.node_tree.nodes if material.node_tree else ()
+        node = next((each for each in nodes if each.type == "BSDF_PRINCIPLED"), None)
+        plain = {"base_color": _limited(material.diffuse_color)}
+        values = _principled(node.inputs, images, uv_names) if node else plain
+        made.append(gvpipe.Material(material.name, double_sided=not material.use_backface_culling, **values))
     return tuple(made), tuple(images.values())
+
+
+def _principled(sockets: Any, images: dict[str, Any], uv_names: dict[str, str]) -> dict[str, Any]:
+    """Fields of a material, from the sockets of a Principled BSDF."""
+    alpha, strength = (float(sockets[name].default_value) for name in ("Alpha", "Emission Strength"))
+    values: dict[str, Any] = {
+        name: float(sockets[socket].default_value) for socket, name in NUMBERS.items() if not sockets[socket].is_linked
+    }
+    base, emission = (
+        (1.0, 1.0, 1.0) if sockets[name].is_linked else tuple(sockets[name].default_value)[:3]
+        for name in ("Base Color", "Emission Color")
+    )
+    pictures = {"base_color_texture": _picture(sockets["Base Color"])}
+    if strength:
+        pictures["emissive_texture"] = _picture(sockets["Emission Color"])
+        values["emissive"] = tuple(strength * each for each in emission)
+    if bump := _before(sockets["Normal"], "NORMAL_MAP"):
+        pictures["normal_texture"] = _picture(bump.inputs["Color"])
+    if _before(sockets["Metallic"], "SEPARATE_COLOR") and (split := _before(sockets["Roughness"], "SEPARATE_COLOR")):
+        pictures["metallic_roughness_texture"] = _picture(split.inputs["Color"])
+        values |= {"metallic": 1.0, "roughness": 1.0}
+    values["base_color"] = _limited((*base, alpha))
+    values["alpha_mode"] = "blend" if alpha < 1 or sockets["Alpha"].is_linked else "opaque"
+    textures = {name: _texture(node, images, uv_names) for name, node in pictures.items() if node}
+    return values | {name: texture for name, texture in textures.items() if texture}
+
+
+def _before(socket: Any, kind: str) -> Any:
+    """The node of a kind that a socket is linked to, or None."""
+    node = socket.links[0].from_node if socket.is_linked else None
+    return node if node and node.type == kind else None
 
 
 def _limited(color: Any) -> tuple[float, ...]:
@@ -219,7 +215,10 @@ def _texture(node: Any, images: dict[str, Any], uv_names: dict[str, str]) -> Any
         uv = uv_names.get(node.inputs["Vector"].links[0].from_node.uv_map, uv)
     wrap = next((name for name, mode in WRAPS.items() if mode == node.extension), "clamp")
     return gvpipe.Texture(
-        list(images).index(node.image.name), uv, wrap=(wrap, wrap), filter="nearest" if node.interpolation == "Closest" else "linear"
+        list(images).index(node.image.name),
+        uv,
+        wrap=(wrap, wrap),
+        filter="nearest" if node.interpolation == "Closest" else "linear",
     )
 
 

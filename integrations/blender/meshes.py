@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import radians
 from typing import Any
 
-import bpy
 import numpy as np
 
 from .sources import Source, Surface
@@ -128,8 +127,3 @@ def _set(mesh: Any, name: str, domain: str, rows: Any, is_color: bool) -> None:
     found = found or mesh.attributes.new(name, kind, domain)
     numbers = rows.astype(np.int32 if kind == "INT" else np.float32, copy=False)
     mesh.attributes[found.name].data.foreach_set(member, np.ascontiguousarray(numbers).reshape(-1))
-
-
-def new_mesh(name: str) -> Any:
-    """A mesh without anything."""
-    return bpy.data.meshes.new(name)

@@ -49,7 +49,12 @@ class GeometryVideo(bpy.types.PropertyGroup):
     )
     start: bpy.props.FloatProperty(name="Start", description="The scene's frame that shows frame 0", default=1, update=_changed)
     speed: bpy.props.FloatProperty(
-        name="Speed", description="Frames of the file for each frame of the scene", default=1, min=0.001, max=1000, update=_changed
+        name="Speed",
+        description="Frames of the file for each frame of the scene",
+        default=1,
+        min=0.001,
+        max=1000,
+        update=_changed,
     )
     repeat: bpy.props.BoolProperty(name="Repeat", description="Start again at the end", update=_changed)
     fields: bpy.props.BoolProperty(

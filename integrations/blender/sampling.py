@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -163,7 +164,7 @@ def _joined(pieces: list[Piece]) -> Sample:
         by_piece.append((owner, rows.reshape(-1)))
         ends = np.cumsum(counts)
         bounds = [0, *(np.flatnonzero(np.diff(piece.slots)) + 1), len(counts)]
-        for low, high in zip(bounds, bounds[1:], strict=False):
+        for low, high in pairwise(bounds):
             start = n_triangles + int(ends[low - 1] if low else 0)
             slot = int(piece.slots[low])
             vertices = (n_points, n_points + len(piece.points))

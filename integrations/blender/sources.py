@@ -70,6 +70,11 @@ class Source:
         """Whether all frames have the same triangles."""
         return len(self.capture.shots) == 1
 
+    @property
+    def has_sound(self) -> bool:
+        """Whether something is to be heard with it, which the file has as a track."""
+        return self._video is not None and self._video.sound is not None
+
     def shot(self, number: int) -> Any:
         """A shot as a `gvpipe.MeshSequence`."""
         if self._shot[0] != number:

@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,15 @@ import numpy as np
 import pytest
 from asset_scene import scene
 from changing import write_objs
+from folders import SAMPLES
+from integrations.test_blender_zip import build
 
 import gvpipe
 
 N_FRAMES = 10
 PYTHON = os.environ.get("BPY_PYTHON") or (sys.executable if importlib.util.find_spec("bpy") else "")
 SCRIPT = Path(__file__).parents[1] / "blender_extension.py"
+VOICE = SAMPLES / "voice.wav"
 TOLERANCE = 1e-6  # of the diagonal
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not PYTHON, reason="bpy is not there: pip install bpy")]
@@ -33,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("blender")
     for name in ("saved/deep", "objs", "sizes"):
         (folder / name).mkdir(parents=True)
-    gvpipe.encode(scene(N_FRAMES), folder / "scene.mp4", "pca", max_error="0.01%")
+    gvpipe.encode(scene(N_FRAMES), folder / "scene.mp4", "pca", max_error="0.01%", audio=VOICE, audio_trim=True)
     for frame in range(N_FRAMES):
         gvpipe.write(scene(N_FRAMES).part(frame, frame + 1), folder / "objs" / f"sheet_{frame:04d}.obj")
     gvpipe.encode(gvpipe.read_capture(write_objs(folder / "sizes")), folder / "capture.mp4", "pca")
@@ -46,6 +50,7 @@ def test_import_plays_saves_and_exports(folder: Path) -> None:
     assert error(arrays["frames"], turned(decoded)) < TOLERANCE
     assert told["objects"] == {"left": ["skin"], "right": ["steel"]}
     assert told["fps"] == 24 and told["frames"] == [1, N_FRAMES] and told["images"] == ["skin.png"]
+    assert told["sounds"] == ["scene.mp4"]
     assert told["valid"] == [True, True] and told["polygons"] == len(decoded.polygons)  # type: ignore[arg-type]
     assert told["uv"] == ["uv"] and told["attributes"]["color"] == ["FLOAT_COLOR", "POINT"]
     n_left = decoded.parts[0].vertices[1]
@@ -102,6 +107,27 @@ def test_captures_frames_modifiers_and_refusals(folder: Path) -> None:
     for message, wanted in zip(told["refused"], ("no such file", "no such file", "create it first", "'much'"), strict=True):
         assert wanted in message and "Traceback" not in message
     assert told["stopped"] == [False, 8]
+    (ended, is_there, notes, rises), stopped = told["modal"]
+    assert (ended, is_there, rises) == ("FINISHED", True, True) and "8 frames" in notes[0]
+    assert stopped == ["CANCELLED", False, ["cancelled; no file was written"], True]
+
+
+def test_blender_validates_and_installs_the_zip(folder: Path) -> None:
+    wheel = folder / "nothing-1.0-py3-none-any.whl"
+    head = "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+    rows = {
+        "nothing.py": "",
+        "nothing-1.0.dist-info/WHEEL": head,
+        "nothing-1.0.dist-info/METADATA": "Name: nothing\nVersion: 1.0\n",
+    }
+    rows["nothing-1.0.dist-info/RECORD"] = "".join(f"{name},,\n" for name in [*rows, "nothing-1.0.dist-info/RECORD"])
+    with zipfile.ZipFile(wheel, "w") as file:
+        for name, text in rows.items():
+            file.writestr(name, text)
+    build().pack(folder / "extension.zip", "linux-x64", "3.11", [wheel])
+    _, told = by_blender("installed", folder)
+    assert "Success" in told.pop("validated")
+    assert told == {"modules": ["bl_ext.user_default.geometry_video"], "objects": 2, "left": False}
 
 
 def test_cycles_draws_the_frame(folder: Path) -> None:
@@ -113,6 +139,7 @@ def test_cycles_draws_the_frame(folder: Path) -> None:
 def by_blender(step: str, folder: Path) -> tuple[Any, Any]:
     """What a step of `SCRIPT` found."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    environment["BLENDER_USER_RESOURCES"] = str(folder / "user")
     command = [PYTHON, str(SCRIPT), step, str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
