@@ -237,26 +237,32 @@ def installed(folder: Path) -> Found:
 
 
 def pictured(folder: Path) -> Found:
-    """Render a frame by Cycles, as ``blender -b FILE -a`` does."""
+    """Render a frame by Cycles, as ``blender -b FILE -a`` does: the picture of docs/integrations.md."""
     load()
-    bpy.ops.import_scene.geometry_video(filepath=str(folder / "scene.mp4"))
-    scene = bpy.context.scene
-    scene.frame_set(scene.frame_start + 3)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    camera.location, camera.rotation_euler = (0.013, -0.06, 0.005), (1.5, 0.0, 0.0)
-    camera.data.clip_start = 0.001
-    light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-    scene.collection.objects.link(light)
-    scene.camera, scene.render.engine, scene.cycles.samples = camera, "CYCLES", 4
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 96, 64, 100
-    scene.render.film_transparent = True
-    scene.frame_start = scene.frame_end = 4
+    scene, gallery = bpy.context.scene, EXTENSION.parents[1] / "docs" / "gallery"
+    bpy.ops.import_scene.geometry_video(filepath=str(gallery / "creature.mp4"))
+    bpy.context.object.location, bpy.context.object.rotation_euler = (0.6, -1.2, 0), (0, 0, 1.0)
+    bpy.ops.import_scene.geometry_video(filepath=str(gallery / "flag.mp4"))
+    bpy.ops.mesh.primitive_plane_add(size=200)
+    place("Camera", bpy.data.cameras.new("Camera"), (0.6, -6.2, 1.6), (1.48, 0, 0))
+    light = bpy.data.lights.new("Sun", "SUN")
+    light.energy, light.angle = 3.0, 0.1
+    place("Sun", light, (0, 0, 5), (0.7, 0.3, 0.4))
+    scene.camera, scene.render.engine, scene.cycles.samples = bpy.data.objects["Camera"], "CYCLES", 24
+    scene.view_settings.view_transform = "Standard"
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 480, 300, 100
+    scene.frame_start = scene.frame_end = 20
     scene.render.filepath = str(folder / "picture_")
     bpy.ops.render.render(animation=True)
-    image = bpy.data.images.load(str(folder / "picture_0004.png"))
-    pixels = np.array(image.pixels[:]).reshape(64, 96, 4)
-    return {"pixels": pixels}, {}
+    image = bpy.data.images.load(str(folder / "picture_0020.png"))
+    return {"pixels": np.array(image.pixels[:]).reshape(300, 480, 4)}, {}
+
+
+def place(name: str, data: Any, location: tuple[float, ...], turn: tuple[float, ...]) -> None:
+    """Put a camera or a light into the scene."""
+    made = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(made)
+    made.location, made.rotation_euler = location, turn
 
 
 def main(step: str, folder: str) -> None:
