@@ -133,7 +133,7 @@ def reopened(folder: Path) -> Found:
 
 def baked(folder: Path) -> Found:
     """Bake to keys and caches, switch the extension off, step."""
-    arrays = {}
+    arrays: dict[str, Any] = {}
     for target, name in (("SHAPE_KEYS", "scene"), ("PC2", "scene"), ("ALEMBIC", "scene"), ("ALEMBIC", "capture")):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         module = load()
@@ -160,6 +160,12 @@ def others(folder: Path) -> Found:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.geometry_video(filepath=str(folder / "objs" / "sheet_0000.obj"))
     arrays = {"objs": np.stack(film(10))}
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = 48  # twice the file's
+    bpy.ops.import_scene.geometry_video(filepath=str(folder / "scene.mp4"), set_scene=False)
+    for each in meshes():
+        each.data.geometry_video.repeat = True
+    arrays["slow"] = np.stack(film(24))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_cube_add(size=2)
     cube, scene = bpy.context.object, bpy.context.scene
@@ -197,7 +203,9 @@ def others(folder: Path) -> Found:
 def modal(folder: Path, chosen: list[Any], stops: bool) -> list[Any]:
     """Export as a window does it, event by event, and stop it by Escape if ``stops``: how it ended, what it told."""
     operator = sys.modules["geometry_video"].exporting.EXPORT_OT_geometry_video
-    path, told, shown = folder / f"modal{stops}.mp4", [], []
+    path = folder / f"modal{stops}.mp4"
+    told: list[str] = []
+    shown: list[float] = []
 
     class Window:
         """What an operator has of itself, and of its window."""
@@ -221,8 +229,7 @@ def modal(folder: Path, chosen: list[Any], stops: bool) -> list[Any]:
 
 def installed(folder: Path) -> Found:
     """Install a zip by Blender's own operator, import by it, remove it."""
-    import addon_utils
-
+    addon_utils: Any = import_module("addon_utils")
     addon_utils.enable("bl_pkg", default_set=True)
     zip_file = str(folder / "extension.zip")
     tool = Path(addon_utils.__file__).parents[1] / "addons_core/bl_pkg/cli/blender_ext.py"  # of `blender --command extension`

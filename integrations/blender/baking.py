@@ -70,7 +70,9 @@ def bake(context: Any, object_: Any, target: str, folder: str) -> None:
     source = opened(playing.absolute(mesh))
     if target != "ALEMBIC" and not source.is_one_mesh:
         raise ValueError("its vertices or triangles change from frame to frame; bake it to Alembic")
-    path = os.path.join(folder, bpy.path.clean_name(mesh.name) + SUFFIXES.get(target, ""))
+    stem = os.path.splitext(os.path.basename(bpy.data.filepath))[0]
+    name = bpy.path.clean_name(f"{stem}_{mesh.name}" if stem else mesh.name)
+    path = os.path.join(folder, name + SUFFIXES.get(target, ""))
     if target == "ALEMBIC":
         _to_alembic(context, object_, source, path)
     else:
@@ -127,7 +129,7 @@ def _to_shape_keys(object_: Any, frames: Baked) -> None:
 
 def _curves(action: Any) -> list[Any]:
     """All curves of an action; Blender 4.4 and newer have them in layers."""
-    if not hasattr(action, "layers"):
+    if not getattr(action, "layers", None):
         return list(action.fcurves)
     strips = [strip for layer in action.layers for strip in layer.strips]
     return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
@@ -141,7 +143,7 @@ def _to_pc2(object_: Any, source: Source, frames: Baked, path: str) -> None:
     gvpipe.write(gvpipe.MeshSequence(frames, faces, source.capture.fps, name=object_.name), path)
     modifier = object_.modifiers.new("Geometry Video", "MESH_CACHE")
     modifier.cache_format = "PC2"
-    modifier.filepath = bpy.path.relpath(path) if bpy.data.filepath else path
+    modifier.filepath = playing.relative(path)
     modifier.interpolation = "NONE"
     modifier.frame_start, modifier.frame_scale = settings.start, settings.speed
 
@@ -169,8 +171,7 @@ def _to_alembic(context: Any, object_: Any, source: Source, path: str) -> None:
             each.select_set(True)
         context.view_layer.objects.active = active
     cache = next(each for each in reversed(bpy.data.cache_files) if os.path.samefile(bpy.path.abspath(each.filepath), path))
-    if bpy.data.filepath:
-        cache.filepath = bpy.path.relpath(path)
+    cache.filepath = playing.relative(path)
     modifier = object_.modifiers.new("Geometry Video", "MESH_SEQUENCE_CACHE")
     modifier.cache_file = cache
     names = [_abc_name(each) for each in (object_.name, object_.data.name)]

@@ -1,7 +1,7 @@
 """File > Import > Geometry Video: a mesh for each part, materials, and the scene's rate and range."""
 
 import os
-from itertools import count
+from math import ceil
 from typing import Any
 
 import bpy
@@ -24,7 +24,9 @@ class IMPORT_OT_geometry_video(bpy.types.Operator, ImportHelper):
 
     filter_glob: bpy.props.StringProperty(default=GLOB, options={"HIDDEN"})
     set_scene: bpy.props.BoolProperty(
-        name="Set Frame Rate and Range", description="Give the scene the file's frames per second and its frames", default=True
+        name="Set Frame Rate and Range",
+        description="Give the scene the file's frames per second and its frames; else the speed keeps the file's clock",
+        default=True,
     )
     split_parts: bpy.props.BoolProperty(
         name="Object for Each Part", description="Else one object, whose materials are slots", default=True
@@ -39,12 +41,12 @@ class IMPORT_OT_geometry_video(bpy.types.Operator, ImportHelper):
         path = os.path.abspath(bpy.path.abspath(self.filepath))
         try:
             source = opened(with_its_frames(path) if self.numbered else path)
+            if self.set_scene:
+                set_scene(context.scene, source)
             made = place(context, source, self.split_parts, "" if self.up == "AUTO" else self.up.lower(), self.relative_path)
         except Exception as error:
             self.report({"ERROR"}, playing.describe(error))
             return {"CANCELLED"}
-        if self.set_scene:
-            set_scene(context.scene, source)
         if source.has_sound:
             add_sound(context.scene, source)
         for object_ in context.selected_objects:
@@ -89,8 +91,9 @@ def place(context: Any, source: Source, split: bool, up: str, relative: bool) ->
         settings = mesh.geometry_video
         settings.up, settings.scale, settings.parts = (up.upper() or "AUTO"), unit, ",".join(map(str, parts))
         settings.start = context.scene.frame_start
-        is_relative = relative and bpy.data.filepath
-        settings.filepath = bpy.path.relpath(source.path) if is_relative else source.path
+        render = context.scene.render
+        settings.speed = source.capture.fps * render.fps_base / render.fps
+        settings.filepath = playing.relative(source.path) if relative else source.path
         made.append(object_)
     for object_ in made:
         playing.follow_mesh(object_.data, context.scene.frame_current)
@@ -141,7 +144,7 @@ def add_slots(mesh: Any, sequence: Any, parts: tuple[int, ...], looks: list[Any]
 def set_scene(scene: Any, source: Source) -> None:
     """Give a scene the rate of a source, and its frames from the scene's first one."""
     rate = source.capture.fps
-    whole = next((number for number in count(max(1, round(rate))) if number >= rate), 1)
+    whole = max(1, ceil(rate))
     scene.render.fps, scene.render.fps_base = whole, whole / rate
     scene.frame_end = scene.frame_start + len(source) - 1
 

@@ -120,7 +120,7 @@ def _set(mesh: Any, name: str, domain: str, rows: Any, is_color: bool) -> None:
         kind = "INT"
     found = mesh.attributes.get(name)
     if found is not None and (found.data_type != kind or found.domain != domain):
-        if found.is_required or name in mesh.uv_layers:
+        if getattr(found, "is_required", False) or name in mesh.uv_layers:
             return
         mesh.attributes.remove(found)
         found = None

@@ -154,7 +154,7 @@ def _refuse(mesh: Any, message: str) -> bool:
 def follow(scene: Any, _: Any = None) -> None:
     """Let all meshes show the scene's frame; those that are being edited stay."""
     for mesh in bpy.data.meshes:
-        if mesh.geometry_video.filepath and not mesh.is_editmode:
+        if mesh.users and mesh.geometry_video.filepath and not mesh.is_editmode:
             follow_mesh(mesh, scene.frame_current)
 
 
@@ -173,7 +173,7 @@ def rebase(target: str, *_: Any) -> None:
         path = mesh.geometry_video.filepath
         if path and mesh.library is None and (path.startswith("//") or not bpy.data.filepath) and target:
             _rebased[mesh.name] = absolute(mesh)
-            _set_path(mesh, _relative(_rebased[mesh.name], os.path.dirname(target)))
+            _set_path(mesh, relative(_rebased[mesh.name], os.path.dirname(target)))
 
 
 @persistent
@@ -181,14 +181,15 @@ def rebase_back(*_: Any) -> None:
     """After a copy was saved: paths count from the folder of the .blend that is open."""
     for name, path in _rebased.items():
         if (mesh := bpy.data.meshes.get(name)) is not None:
-            folder = os.path.dirname(bpy.data.filepath)
-            _set_path(mesh, _relative(path, folder) if folder else path)
+            _set_path(mesh, relative(path))
     _rebased.clear()
 
 
-def _relative(path: str, folder: str) -> str:
+def relative(path: str, folder: str = "") -> str:
+    """A path that counts from a folder, by default that of the .blend; itself where there is none, or on another drive."""
+    folder = folder or os.path.dirname(bpy.data.filepath)
     try:
-        return bpy.path.relpath(path, start=folder)
+        return bpy.path.relpath(path, start=folder) if folder else path
     except ValueError:  # another drive
         return path
 
