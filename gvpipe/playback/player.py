@@ -31,6 +31,7 @@ from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
 from gvpipe.grids.volume import Volume
+from gvpipe.io.simulation.vtk_frames import to_pyvista
 from gvpipe.media.sound import Sound
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
@@ -250,6 +251,10 @@ class Player:
             volume=self.volume,
             sound=self.sound,
         )
+
+    def to_pyvista(self, frame: int = 0) -> Any:
+        """A frame as a data set of PyVista, which must be installed; raises as `gvpipe.to_pyvista` does."""
+        return to_pyvista(self, frame)
 
     def __len__(self) -> int:
         return self.bitstream.n_frames
