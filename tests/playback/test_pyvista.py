@@ -90,6 +90,7 @@ class TestPyVista:
                 reader.set_active_time_value(time + 0.1)
                 assert reader.active_time_value == time and np.array_equal(reader.read().points, video[frame])
             assert reader.read().n_points == video.to_pyvista(5).n_points == 4
+            assert reader.read().field_data["TimeValue"] == video.to_pyvista(-1).field_data["TimeValue"] == 1.25
             reader.set_active_time_point(1)
             assert reader.read().cell_data["load"].tolist() == video.to_pyvista(1).cell_data["load"].tolist()
         gvpipe.encode(plates(), tmp_path / "b.mp4")

@@ -47,7 +47,8 @@ def to_vtk(source: Any, frame: int = 0) -> Any:
     if hasattr(source, "times"):
         time = float(source.times[frame])
     else:  # a capture: by its rate where the shot tells no times
-        time = one.metadata.times[0] if one.metadata.times else range(len(source))[frame] / one.fps
+        start = source.shots[0].metadata.start_time
+        time = one.metadata.times[0] if one.metadata.times else start + range(len(source))[frame] / one.fps
     return VtkFrames(one, np.array([time]))[0]
 
 
