@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from asset_scene import scene
+from doc_pictures import keep
 from folders import ROOT
 
 import gvpipe
@@ -51,6 +52,19 @@ simple.SaveData(out, proxy=reader, MaxError=0.001)
 """
 
 
+DRAW = f"""{OPEN}
+reader = simple.OpenDataFile(path)
+view = simple.CreateRenderView(ViewSize=[480, 320], OrientationAxesVisibility=0)
+shown = simple.Show(reader, view, Representation="Surface With Edges")
+view.ViewTime = reader.TimestepValues[20]
+simple.ColorBy(shown, ("POINTS", "strain"))
+shown.RescaleTransferFunctionToDataRange(True, False)
+shown.SetScalarBarVisibility(view, True)
+simple.ResetCamera(view)
+simple.SaveScreenshot(out, view, ImageResolution=[480, 320])
+"""
+
+
 def missing() -> str:
     """Why ParaView cannot run the plug-in, "" if it can."""
     if shutil.which("pvpython") is None:
@@ -72,11 +86,11 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> str:
     return os.pathsep.join(map(str, (folder, ROOT, ROOT / "codecs", PLUGIN.parent / "debian12")))
 
 
-def run(packages: str, script: str, path: Path, out: Path) -> None:
+def run(packages: str, script: str, path: Path, out: Path, *before: str) -> None:
     environment = {**os.environ, "PYTHONPATH": packages}
     code = out.with_suffix(".py")
     code.write_text(script)
-    ended = subprocess.run(["pvpython", code, path, out], env=environment, capture_output=True, text=True, timeout=300)
+    ended = subprocess.run([*before, "pvpython", code, path, out], env=environment, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0 and out.exists(), ended.stdout + ended.stderr
 
 
@@ -125,3 +139,9 @@ class TestParaView:
             assert [part.name for part in found.parts] == [part.name for part in source.parts]
             errors = gvpipe.compare(source, found)
             assert errors.max <= 0.001
+
+    @pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="no xvfb-run; apt-get install xvfb")
+    def test_picture_of_the_documentation(self, packages: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+        gvpipe.encode(gvpipe.read(ROOT / "samples" / "flag.npz"), tmp_path / "flag.mp4")
+        run(packages, DRAW, tmp_path / "flag.mp4", tmp_path / "flag.png", "xvfb-run", "-a")
+        keep(tmp_path / "flag.png", "paraview", request)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from asset_scene import scene
+from doc_pictures import keep
 from folders import ROOT
 
 import gvpipe
@@ -120,6 +121,19 @@ class TestPyVista:
         (tmp_path / "a.mp4").write_bytes(b"no video")
         with pytest.raises(gvpipe.GvpipeError, match=r"a\.mp4"):
             pv.read(tmp_path / "a.mp4")
+
+    def test_picture_of_the_documentation(self, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+        """In a process of its own: VTK warns where there is no screen, and its windows outlive the test."""
+        gvpipe.encode(gvpipe.read(ROOT / "samples" / "flag.npz"), tmp_path / "flag.mp4")
+        code = f"""import pyvista as pv
+reader = pv.get_reader({str(tmp_path / "flag.mp4")!r})
+reader.set_active_time_point(20)
+plotter = pv.Plotter(off_screen=True, window_size=(480, 320))
+plotter.add_mesh(reader.read(), scalars="strain", show_edges=True)
+plotter.view_xy()
+plotter.screenshot({str(tmp_path / "flag.png")!r})"""
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+        keep(tmp_path / "flag.png", "pyvista", request)
 
     def test_core_imports_no_pyvista(self) -> None:
         code = "import gvpipe, sys; gvpipe.to_trimesh, gvpipe.to_pyvista, gvpipe.Player; print('pyvista' in sys.modules)"

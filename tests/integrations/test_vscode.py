@@ -12,6 +12,7 @@ from typing import Any
 
 import browsers
 import pytest
+from doc_pictures import keep
 from folders import ROOT
 from pages import BUNDLE, run
 from sequences import waving
@@ -109,7 +110,8 @@ def test_a_geometry_video_plays(page: Any, tmp_path: Path) -> None:
     played = run(
         page,
         """const element = document.querySelector("geometry-video");
-        const playing = new Promise((done) => element.addEventListener("frame", ({ detail }) => detail > 1 && done(element.video.frameCount)));
+        const playing = new Promise((done) =>
+          element.addEventListener("frame", ({ detail }) => detail > 1 && done(element.video.frameCount)));
         postMessage({ bytes: new Uint8Array(args[0]) });
         return [await playing, element.paused, (await element.still()).size];""",
         list((tmp_path / "wave.mp4").read_bytes()),
@@ -131,3 +133,19 @@ def test_another_film_is_left_to_the_viewer(page: Any) -> None:
     )
     assert told[0].startswith("This file cannot be played as a geometry video: ") and told[1] is False
     assert told[2] == [{"type": "ready"}, {"type": "other"}]
+
+
+@needs_node
+@has_chromium
+@pytest.mark.slow
+def test_picture_of_the_documentation(page: Any, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    gvpipe.encode(gvpipe.read(ROOT / "samples" / "flag.npz"), tmp_path / "flag.mp4", "pca")
+    show = """const element = document.querySelector("geometry-video");
+    element.setAttribute("field", "strain");
+    postMessage({ bytes: new Uint8Array(args[0]) });
+    await new Promise((done) => element.addEventListener("frame", ({ detail }) => detail > 1 && done()));
+    await element.seek(20);
+    await new Promise((done) => setTimeout(done, 500));"""
+    page.set_window_size(640, 520)
+    run(page, show, list((tmp_path / "flag.mp4").read_bytes()))
+    keep(page.get_screenshot_as_png(), "vscode", request)

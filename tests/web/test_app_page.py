@@ -8,6 +8,7 @@ from typing import Any
 
 import browsers
 import pytest
+from doc_pictures import keep
 from folders import ROOT
 from pages import BUNDLE, run
 from sequences import waving
@@ -46,6 +47,23 @@ def test_another_file_is_named(page: Any, tmp_path: Path) -> None:
     (tmp_path / "film.mp4").write_bytes(b"\0\0\0\x18ftypisom")
     choose(page, tmp_path / "film.mp4")
     assert run(page, f"{UNTIL} return line.textContent;", "cannot").startswith("film.mp4 cannot be played: ")
+
+
+def test_a_dropped_file_plays(page: Any, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    """The sample flag, dropped; its picture is the documentation's."""
+    gvpipe.encode(gvpipe.read(ROOT / "samples" / "flag.npz"), tmp_path / "flag.mp4", "pca")
+    page.set_window_size(640, 520)
+    drop = f"""const held = new DataTransfer();
+    held.items.add(new File([new Uint8Array(args[1])], "flag.mp4"));
+    document.querySelector("geometry-video").setAttribute("field", "strain");
+    document.body.dispatchEvent(new DragEvent("drop", {{ bubbles: true, cancelable: true, dataTransfer: held }}));
+    {UNTIL}
+    await document.querySelector("geometry-video").seek(20);
+    await new Promise((done) => setTimeout(done, 500));
+    return line.textContent;"""
+    told = run(page, drop, "frames", list((tmp_path / "flag.mp4").read_bytes()))
+    assert told.startswith("flag.mp4: 48 frames of 675 vertices.")
+    keep(page.get_screenshot_as_png(), "app", request)
 
 
 def test_nothing_can_be_sent(page: Any, site: tuple[Path, str], tmp_path: Path) -> None:
