@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,8 +37,7 @@ def to_trimesh(source: Any, frame: int = 0) -> trimesh.Trimesh:
         >>> mesh, mesh.vertex_attributes["heat"].tolist()
         (<trimesh.Trimesh(vertices.shape=(3, 3), faces.shape=(1, 3))>, [4.0, 5.0, 6.0])
     """
-    import trimesh
-
+    library: Any = import_module("trimesh")
     one = one_frame(source, frame)
     numbers = {key: np.asarray(each) for key, each in one.attributes.items()}
     numbers |= {key: each.read(0, 1)[0] for key, each in one.fields.items()}
@@ -47,7 +47,7 @@ def to_trimesh(source: Any, frame: int = 0) -> trimesh.Trimesh:
         held = {key: values for key, values in numbers.items() if kinds[key][0] == domain}
         return {key: values[:, 0] if values.shape[1] == 1 else values for key, values in held.items()}
 
-    mesh = trimesh.Trimesh(
+    mesh: trimesh.Trimesh = library.Trimesh(
         one.read_absolute(0, 1)[0],
         one.faces,
         vertex_colors=next((numbers[key] for key, what in kinds.items() if what == ("vertex", "color")), None),
@@ -56,8 +56,8 @@ def to_trimesh(source: Any, frame: int = 0) -> trimesh.Trimesh:
         process=False,
     )
     uv = next((numbers[key] for key, what in kinds.items() if what == ("vertex", "uv")), None)
-    if uv is not None and not mesh.visual.defined:
-        mesh.visual = trimesh.visual.TextureVisuals(uv, image=_picture(one))
+    if uv is not None and mesh.visual is not None and not mesh.visual.defined:
+        mesh.visual = library.visual.TextureVisuals(uv, image=_picture(one))
     return mesh
 
 

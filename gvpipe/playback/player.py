@@ -269,6 +269,8 @@ class Player:
             if step != 1:
                 frames = [self[i] for i in range(start, stop, step)]
                 return np.stack(frames) if frames else self._shared.read(0, 0)
+            if stop == start + 1:  # sequences that show frame after frame ask like this
+                return self._cache.frame(start)[None]
             return self._shared.read(start, max(start, stop))
         index = operator.index(key)
         if not -len(self) <= index < len(self):

@@ -19,18 +19,18 @@ import gvpipe
 
 HAS_PYVISTA = importlib.util.find_spec("pyvista") is not None
 needs_pyvista = pytest.mark.skipif(not HAS_PYVISTA, reason="pyvista is not there: pip install 'gvpipe[pyvista]'")
-CORNERS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [3, 0.5, 0]]
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [3, 0.5, 0]], np.float32)
 
 
 def plates() -> gvpipe.MeshSequence:
     """Two quads and a triangle that rise, in two parts, with a number per vertex and one per polygon."""
     faces = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2], [4, 6, 5]], np.int32)
-    positions = np.array([np.add(CORNERS, [0, 0, k / 4]) for k in range(4)], np.float32)
+    positions = CORNERS + np.array([0, 0, 1], np.float32) * np.arange(4, dtype=np.float32)[:, None, None] / 4
     return gvpipe.MeshSequence(
         positions,
         faces,
         fps=4,
-        attributes={"uv": np.array(CORNERS, np.float32)[:, :2] / 3, "material": np.array([7, 7, 8, 8, 9], np.int32)},
+        attributes={"uv": CORNERS[:, :2] / 3, "material": np.array([7, 7, 8, 8, 9], np.int32)},
         fields={
             "heat": np.arange(28, dtype=np.float32).reshape(4, 7),
             "load": (np.arange(4)[:, None] + np.array([0, 0, 1, 1, 2])).astype(np.int32),
@@ -42,12 +42,13 @@ def plates() -> gvpipe.MeshSequence:
 
 def test_trimesh_has_positions_numbers_and_looks() -> None:
     given = scene()
-    mesh = gvpipe.to_trimesh(given, -1)
+    mesh: Any = gvpipe.to_trimesh(given, -1)
     assert np.array_equal(mesh.vertices, given[len(given) - 1]) and np.array_equal(mesh.faces, given.faces)
     assert np.array_equal(mesh.vertex_attributes["stress"], given.fields["stress"][-1])
     assert np.array_equal(mesh.face_attributes["state"], given.fields["state"][-1])
     assert np.array_equal(mesh.visual.vertex_colors, np.asarray(given.attributes["color"]))
-    assert np.array_equal(gvpipe.to_trimesh(plates()).visual.uv, np.array(CORNERS, np.float32)[:, :2] / 3)
+    textured: Any = gvpipe.to_trimesh(plates())
+    assert np.array_equal(textured.visual.uv, CORNERS[:, :2] / 3)
     with pytest.raises(IndexError, match="frame 4 of sequence: there are 4"):
         gvpipe.to_trimesh(plates(), 4)
 

@@ -110,9 +110,9 @@ class VtkFrames:
         return made
 
     def _points(self, frame: int) -> Array:
-        if self._sequence.origin.any():
-            return self._sequence.read_absolute(frame, frame + 1)[0]
-        return self._sequence.read(frame, frame + 1)[0]
+        is_far = self._sequence.origin.any()
+        points: Array = (self._sequence.read_absolute if is_far else self._sequence.read)(frame, frame + 1)[0]
+        return points
 
     @cached_property
     def _cells(self) -> tuple[Any, Any]:
