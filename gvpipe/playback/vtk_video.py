@@ -25,7 +25,8 @@ class VtkVideo:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.player = CapturePlayer(path)
-        self.times: Float64 = np.concatenate(capture_times(self.player.capture()))
+        row: Any = self.player  # as a capture, whose shots tell their times before anything is decoded
+        self.times: Float64 = np.concatenate(capture_times(row))
         self._frames: tuple[int, VtkFrames] | None = None  # of the shot that was last asked for
 
     def frame(self, frame: int) -> Any:
