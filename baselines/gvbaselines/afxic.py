@@ -23,6 +23,7 @@ import numpy as np
 from gvbaselines.baseline import Baseline
 from gvbaselines.numbers import STEP, pack_origin, quantise, read_origin, read_step
 from gvbaselines.parallelogram import traversal_of
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject
@@ -42,7 +43,7 @@ class AfxIc(Baseline):
     summary: ClassVar[str] = "interpolator compression of MPEG-4 AFX (Jang et al. 2004)"
     same_bits: ClassVar[bool] = True
 
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
         from gvbaselines.afxic_kernels import difference
 

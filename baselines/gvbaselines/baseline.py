@@ -72,13 +72,14 @@ class Baseline(BaseCodec):
         self.check_range(1, MAX_SEGMENT, "segment")
 
     @abstractmethod
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment.
 
         Args:
             frames: ``(n, P, 3)`` points, model units.
             mesh: their triangles.
             error: root mean square error of a point, model units, that is aimed at; the loop around corrects it.
+            memo: of this segment: what does not depend on the error.
         """
 
     @classmethod
@@ -102,7 +103,7 @@ class Baseline(BaseCodec):
 
         def attempt(error: float) -> StepTrial:
             report("frames", 0)
-            bitstream = self._code_all(sequence, shared, error)
+            bitstream = self._code_all(sequence, shared, error, memo)
             encoded = Encoded(bitstream, shared.coded.permutation)
             return StepTrial(encoded, error, root_mean_square(own, self.reader(bitstream)))
 
@@ -118,14 +119,15 @@ class Baseline(BaseCodec):
         """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
         return numbered_parts(("frames",), read_segments(bitstream, MAX_SEGMENTS))
 
-    def _code_all(self, sequence: MeshSequence, shared: CodedConnectivity, error: float) -> Bitstream:
+    def _code_all(self, sequence: MeshSequence, shared: CodedConnectivity, error: float, memo: Memo) -> Bitstream:
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
+        memos = memo("segments", lambda: [Memo() for _ in bounds[1:]])
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order}
         for s, (start, stop) in enumerate(pairwise(bounds)):
             trajectories = read_trajectories(sequence, start, stop, shared.members)
             frames = trajectories.reshape(len(trajectories), -1, 3).swapaxes(0, 1)  # (P, 3n) -> (n, P, 3)
             try:
-                sections[f"frames.{s}"] = self.code_frames(np.ascontiguousarray(frames), shared.mesh, error)
+                sections[f"frames.{s}"] = self.code_frames(np.ascontiguousarray(frames), shared.mesh, error, memos[s])
             except ValueError as exc:
                 raise InputError(f"{self.id} cannot code {sequence.name} so finely: {exc}; ask for a lower quality") from exc
         return self._bitstream(sequence, {"segments": len(bounds) - 1, **self.header()}, sections)

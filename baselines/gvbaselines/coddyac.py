@@ -20,6 +20,7 @@ import numpy as np
 from gvbaselines.baseline import Baseline
 from gvbaselines.numbers import STEP, decode_columns, encode_columns, quantise, read_step
 from gvbaselines.parallelogram import residuals_of, traversal_of, values_of
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject
@@ -43,7 +44,7 @@ class Coddyac(Baseline):
         super().__post_init__()
         self.check_range(0, MAX_COMPONENTS, "components")
 
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
         trajectories = np.ascontiguousarray(frames.swapaxes(0, 1)).reshape(mesh.n_points, -1)  # (P, 3n)
         squared = error * error * len(frames) * mesh.n_points
@@ -56,7 +57,9 @@ class Coddyac(Baseline):
     def decode_frames(cls, cursor: Cursor, settings: JsonObject, mesh: Topology, n_frames: int) -> Float64:
         """Mirror of `code_frames`."""
         step = read_step(cursor)
-        basis = decode_basis(cursor.block(), n_frames, mesh.n_points, step, cursor.name)
+        block = cursor.block()
+        Cursor(block, cursor.name).varint(min(mesh.n_points, 3 * n_frames), "the number of components")
+        basis = decode_basis(block, n_frames, mesh.n_points, step, cursor.name)
         residuals = decode_columns(cursor, mesh.n_points, basis.vectors.shape[1])
         cursor.end()
         trajectories = basis.mean + values_of(residuals, traversal_of(mesh)) * step @ basis.vectors.T

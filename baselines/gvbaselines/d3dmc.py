@@ -24,6 +24,7 @@ from gvbaselines.baseline import Baseline
 from gvbaselines.numbers import STEP, pack_origin, quantise, read_origin, read_step
 from gvbaselines.octree import Octree, build_octree, ranges
 from gvbaselines.parallelogram import residuals_of, traversal_of, values_of
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject
@@ -42,7 +43,7 @@ class D3dmc(Baseline):
     version: ClassVar[int] = 1
     summary: ClassVar[str] = "octree of motion vectors, frame from frame (Mueller et al. 2005)"
 
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
         head, origin = pack_origin(frames)
         step = STEP_PER_ERROR * error

@@ -27,6 +27,7 @@ import numpy as np
 from gvbaselines.baseline import Baseline
 from gvbaselines.numbers import STEP, pack_origin, quantise, read_origin, read_step
 from gvbaselines.parallelogram import traversal_of
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject
@@ -65,7 +66,7 @@ class Dynapack(Baseline):
         """The predictor."""
         return {"predictor": self.predictor}
 
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
         head, origin = pack_origin(frames)
         step = STEP_PER_ERROR * error

@@ -23,6 +23,7 @@ import numpy as np
 from gvbaselines.baseline import Baseline
 from gvbaselines.eigenframes import code_basis, fit_frames, read_basis, rebuild
 from gvbaselines.numbers import STEP, decode_columns, encode_columns, multiples, quantise, read_step
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject
@@ -53,7 +54,7 @@ class KgLpc(Baseline):
         """The order of prediction."""
         return {"taps": self.taps}
 
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
         centre_step = CENTRE_STEP * error
         centres = quantise(frames.mean(axis=1), centre_step)

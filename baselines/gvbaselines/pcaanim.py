@@ -23,6 +23,7 @@ import numpy as np
 from gvbaselines.baseline import Baseline
 from gvbaselines.eigenframes import code_basis, fit_frames, read_basis, rebuild
 from gvbaselines.numbers import STEP, decode_columns, encode_columns, multiples, quantise, read_step
+from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject
@@ -40,7 +41,7 @@ class PcaAnim(Baseline):
     version: ClassVar[int] = 1
     summary: ClassVar[str] = "principal components of frames after affine motion (Alexa and Mueller 2000)"
 
-    def code_frames(self, frames: Float64, mesh: Topology, error: float) -> bytes:
+    def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
         maps, size = _fit_maps(frames)
         map_step = MAP_FINENESS * error / size
