@@ -1,4 +1,4 @@
-"""`reproduce`: the numbers of the codecs' papers, measured here."""
+"""`reproduce`, which measures the numbers of papers, and `fetch-data`, which brings public sequences."""
 
 from __future__ import annotations
 
@@ -28,3 +28,36 @@ def reproduce(papers: tuple[str, ...], data: str, quick: bool, folder: str | Non
         made = reproducing.reproduce(papers or tuple(reproducing.PAPERS), data, quick, folder, progress)
     out.json(made.to_json())
     out.text(made.markdown().rstrip("\n"))
+
+
+@click.command("fetch-data")
+@click.argument("names", metavar="NAMES...", nargs=-1)
+@click.option("--data", default="data", show_default=True, metavar="DIR", help="Folder that takes NAME.npz.")
+@click.option("--list", "lists", is_flag=True, help="List the sequences with licence, size and address.")
+@click.option("--all", "everything", is_flag=True, help="Fetch all that are listed.")
+@output_options
+def fetch_data(names: tuple[str, ...], data: str, lists: bool, everything: bool, out: Output) -> None:
+    """Fetch public sequences, each checked against its SHA-256, for `gvpipe bench` and `gvpipe reproduce`.
+
+    \b
+    gvpipe fetch-data --list
+    gvpipe fetch-data fox_walk knight_spin --data sequences
+    """
+    from gvpipe.benchmark.public_sequences import SEQUENCES, fetch_sequence, public_sequences
+
+    if lists:
+        out.json({"sequences": [sequence.to_json() for sequence in SEQUENCES]})
+        for one in SEQUENCES:
+            out.text(f"{one.name}: {one.what}; {one.licence}; {one.bytes} bytes, {one.url}")
+        return
+    if bool(names) == everything:
+        raise click.UsageError("give names of sequences, or --all; --list shows them")
+    wanted = list(SEQUENCES) if everything else public_sequences(names)
+    made = []
+    with out.progress() as progress:
+        for sequence in wanted:
+            path, is_new = fetch_sequence(sequence, data, progress)
+            made.append({"name": sequence.name, "path": str(path), "fetched": is_new, "licence": sequence.licence})
+    out.json({"sequences": made})
+    for one in made:
+        out.text(f"{one['path']}{'' if one['fetched'] else ', which was there'}: {one['licence']}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ class Lab:
         known: curves that were measured before.
         skipped: names of sequences that are left out, as large ones in a quick run.
         progress: called before each curve with its name.
+        keep: called with all curves after each one that was measured.
     """
 
     def __init__(
@@ -40,11 +41,12 @@ class Lab:
         known: Sequence[Curve] = (),
         skipped: Sequence[str] = (),
         progress: Progress | None = None,
+        keep: Callable[[BenchReport], None] | None = None,
     ) -> None:
         self.data, self.qualities, self.skipped = data, tuple(qualities), tuple(skipped)
         self._curves = {(curve.sequence, curve.codec): curve for curve in known}
         self._sequences: dict[str, MeshSequence] = {}
-        self._progress = progress or silent
+        self._progress, self._keep = progress or silent, keep
 
     @property
     def curves(self) -> list[Curve]:
@@ -82,6 +84,8 @@ class Lab:
             made = sweep.measure_curve(str(path), codec, left, {})
             points = sorted([*done, *made.points], key=lambda point: float(point["quality"]))
             self._curves[name, codec] = Curve(**{**vars(made), "points": points})
+            if self._keep is not None:
+                self._keep(self.report())
         return self._curves[name, codec]
 
     def _path(self, name: str) -> Path:

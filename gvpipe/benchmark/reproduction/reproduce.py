@@ -67,7 +67,7 @@ def reproduce(
         papers: names in `PAPERS`.
         data: folder of sequences, ``NAME.npz``.
         quick: three qualities in place of six, and without the largest sequence.
-        out: folder for results; curves that an earlier run left there are not measured again. It is written after each paper.
+        out: folder for results. Curves are kept there as they are measured; a later run measures those that are missing.
         progress: called before each curve.
 
     Raises:
@@ -78,18 +78,20 @@ def reproduce(
         raise InputError(f"no paper {wrong!r}; there are {', '.join(PAPERS)}")
     if not Path(data).is_dir():
         raise InputError(f"{data} is no folder; give the one with the sequences as --data DIR")
+    if out is not None:
+        Path(out).mkdir(parents=True, exist_ok=True)
     lab = Lab(
         Path(data),
         QUICK_QUALITIES if quick else QUALITIES,
         _known(out),
         LARGE if quick else (),
         progress,
+        None if out is None else (lambda report: report.write(Path(out) / CURVES)),
     )
     outcomes: dict[str, list[Outcome]] = {}
     for name in papers:
         outcomes[name] = [judge(claim, lab) for claim in claims_of(name)]
         if out is not None:
-            Path(out).mkdir(parents=True, exist_ok=True)
             Reproduction(outcomes, lab.report()).write(out)
     return Reproduction(outcomes, lab.report())
 
