@@ -135,16 +135,23 @@ def _split(left: Float64) -> Bool:
 
 def _leave(frames: Float64, base: Float64) -> Float64:
     """What the best rigid motion leaves of ``frames (n, m, 3)``."""
-    return np.asarray(frames - _move(base, _fit(frames, base, 1.0), 1.0))
+    rotations, centres = _find_motion(frames, base)
+    return np.asarray(frames - (base - base.mean(axis=0)) @ rotations.swapaxes(1, 2) - centres[:, None])
 
 
 def _fit(frames: Float64, base: Float64, size: float) -> Float64:
-    """The rotation vectors, times ``size``, and the centres of a cluster: ``(n, 6)``, least squares (Kabsch)."""
+    """The rotation vectors, times ``size``, and the centres of a cluster: ``(n, 6)``."""
+    rotations, centres = _find_motion(frames, base)
+    return np.concatenate([size * _vectors(rotations), centres], axis=1)
+
+
+def _find_motion(frames: Float64, base: Float64) -> tuple[Float64, Float64]:
+    """Rotations ``(n, 3, 3)`` and centres ``(n, 3)`` that bring ``base (m, 3)`` closest to ``frames (n, m, 3)`` (Kabsch)."""
     centre, centres = base.mean(axis=0), frames.mean(axis=1)
-    covariance = np.einsum("fmi,mj->fij", frames - centres[:, None], base - centre)
+    covariance = (frames - centres[:, None]).swapaxes(1, 2) @ (base - centre)
     left, _, right = np.linalg.svd(covariance)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return np.concatenate([size * _vectors(left @ right), centres], axis=1)
+    return np.asarray(left @ right), np.asarray(centres)
 
 
 def _move(base: Float64, motion: Float64, size: float) -> Float64:

@@ -48,7 +48,7 @@ def curve(codec: str, factor: float, sequence: str = "cow") -> Curve:
             "max_diag": error,
             **dict.fromkeys(("rmse", "rmse_diag", "kg", "sted", "da"), error),
         }
-        for quality, error in zip(QUICK_QUALITIES, (1.0, 0.1, 0.01), strict=True)
+        for quality, error in zip(QUICK_QUALITIES, (1.0, 0.1, 0.01, 0.001), strict=True)
     ]
     return Curve(sequence, 9, 8, 2, codec, {}, None, points)
 
@@ -64,7 +64,7 @@ def test_rates_and_errors_of_curves(lab: Lab) -> None:
     assert rate("cow", "pca", "kg", 0.05)(lab) == pytest.approx(20)
     assert rate("cow", "pca", "kg", 2.0)(lab) is None
     assert error_at(curve("pca", 1.0).points, "kg", 20.0) == pytest.approx(0.05)
-    assert error_at(curve("pca", 1.0).points, "kg", 200.0) is None
+    assert error_at(curve("pca", 1.0).points, "kg", 2000.0) is None
     for measured, at in ((less_rate, 0.1), (less_error, 20.0)):
         assert measured("cow", "pca", "pca:predictor=navg", "kg", at)(lab) == pytest.approx(50)
     assert fewer_bytes("cow", "pca", "pca:predictor=navg", "coefficients")(lab) == pytest.approx(50)

@@ -66,7 +66,7 @@ def reproduce(
     Args:
         papers: names in `PAPERS`.
         data: folder of sequences, ``NAME.npz``.
-        quick: three qualities in place of six, and without the largest sequence.
+        quick: four qualities in place of six, and without the largest sequence.
         out: folder for results. Curves are kept there as they are measured; a later run measures those that are missing.
         progress: called before each curve.
 
