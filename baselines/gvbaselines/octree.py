@@ -41,7 +41,7 @@ class Octree:
 
 
 def build_octree(points: Float64) -> Octree:
-    """The octree of ``points (P, 3)``, down to cells of one point, or `MAX_LEVEL`."""
+    """The octree of ``points (P, 3)``, down to cells of one point; points that lie together are parted below `MAX_LEVEL`."""
     low = points.min(axis=0)
     side = float((points.max(axis=0) - low).max()) or 1.0
     cell = np.clip(np.floor((points - low) / side * 2**MAX_LEVEL), 0, 2**MAX_LEVEL - 1).astype(np.int64)
@@ -57,6 +57,8 @@ def build_octree(points: Float64) -> Octree:
         starts.append(np.append(np.flatnonzero(np.diff(coarse, prepend=-1)), len(points)))
         if len(starts[-1]) > len(points):
             break
+    else:
+        starts.append(np.arange(len(points) + 1))
     children = [np.searchsorted(below, above) for above, below in pairwise(starts)]
     return Octree(order, starts, children)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,8 @@ class Reproduction:
 
     def markdown(self) -> str:
         """A heading and a table for each paper."""
-        return "\n\n".join(f"## {name}\n\n{PAPERS[name][0]}.\n\n{table(made)}" for name, made in self.outcomes.items()) + "\n"
+        papers = self.to_json()["papers"]
+        return "\n\n".join(f"## {name}\n\n{PAPERS[name][0]}.\n\n{table(made)}" for name, made in papers.items()) + "\n"
 
     def write(self, folder: str | os.PathLike[str]) -> None:
         """Write ``reproduction.json``, ``reproduction.md`` and the curves into a folder; raises `OutputError`."""
@@ -101,18 +102,15 @@ def claims_of(paper: str) -> list[Claim]:
     return PAPERS[paper][1]()
 
 
-def table(outcomes: Sequence[Outcome]) -> str:
-    """A table in Markdown: claims, numbers, ratio, state and why."""
+def table(outcomes: Sequence[Mapping[str, Any]]) -> str:
+    """A table in Markdown of `Outcome.to_json`: claims, numbers, ratio, state and why."""
     rows = ["| where | the paper says | paper | ours | ours / paper | state | remark |", "|---|---|---|---|---|---|---|"]
-    for outcome in outcomes:
-        claim = outcome.claim
-        paper = (
-            "-" if claim.paper is None else f"{claim.rule + ' ' if claim.measure else ''}{claim.paper:g} {claim.unit}".strip()
-        )
-        ours = "-" if outcome.ours is None else f"{outcome.ours:.3g} {claim.unit}".strip()
-        ratio = "-" if outcome.ratio is None else f"{outcome.ratio:.2f}"
-        cells = (claim.where, claim.text, paper, ours, ratio, outcome.state, outcome.why or "-")
-        rows.append(f"| {' | '.join(cells)} |")
+    for one in outcomes:
+        rule = "" if one["ours"] is None else f"{one['rule']} "
+        paper = "-" if one["paper"] is None else f"{rule}{one['paper']:g} {one['unit']}".strip()
+        ours = "-" if one["ours"] is None else f"{one['ours']:.3g} {one['unit']}".strip()
+        ratio = "-" if one["ratio"] is None else f"{one['ratio']:.2f}"
+        rows.append(f"| {' | '.join((one['where'], one['claim'], paper, ours, ratio, one['state'], one['why'] or '-'))} |")
     return "\n".join(rows)
 
 
