@@ -10,7 +10,7 @@ from gvpipe.cli.console import Output, output_options
 @click.command()
 @click.argument("papers", metavar="PAPERS...", nargs=-1)
 @click.option("--data", default="data", show_default=True, metavar="DIR", help="Folder with the sequences, NAME.npz.")
-@click.option("--quick", is_flag=True, help="Four qualities in place of six, without the largest sequence.")
+@click.option("--quick", is_flag=True, help="Three qualities in place of six, without the largest sequence.")
 @click.option("--out", "folder", metavar="DIR", help="Write reproduction.json, reproduction.md and curves.json there.")
 @output_options
 def reproduce(papers: tuple[str, ...], data: str, quick: bool, folder: str | None, out: Output) -> None:

@@ -48,7 +48,7 @@ def curve(codec: str, factor: float, sequence: str = "cow") -> Curve:
             "max_diag": error,
             **dict.fromkeys(("rmse", "rmse_diag", "kg", "sted", "da"), error),
         }
-        for quality, error in zip(QUICK_QUALITIES, (1.0, 0.1, 0.01, 0.001), strict=True)
+        for quality, error in zip(QUICK_QUALITIES, (1.0, 0.1, 0.01), strict=True)
     ]
     return Curve(sequence, 9, 8, 2, codec, {}, None, points)
 

@@ -15,7 +15,7 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.playback import files
 
 QUALITIES = (0.0, 20.0, 40.0, 60.0, 75.0, 90.0)
-QUICK_QUALITIES = (20.0, 50.0, 75.0, 88.0)
+QUICK_QUALITIES = (20.0, 50.0, 75.0)
 
 
 class Missing(GvpipeError):

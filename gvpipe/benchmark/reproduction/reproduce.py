@@ -67,7 +67,7 @@ def reproduce(
     Args:
         papers: names in `PAPERS`.
         data: folder of sequences, ``NAME.npz``.
-        quick: four qualities in place of six, and without the largest sequence.
+        quick: three qualities in place of six, and without the largest sequence.
         out: folder for results. Curves are kept there as they are measured; a later run measures those that are missing.
         progress: called before each curve.
 
@@ -108,7 +108,7 @@ def table(outcomes: Sequence[Mapping[str, Any]]) -> str:
     for one in outcomes:
         rule = "" if one["ours"] is None else f"{one['rule']} "
         paper = "-" if one["paper"] is None else f"{rule}{one['paper']:g} {one['unit']}".strip()
-        ours = "-" if one["ours"] is None else f"{one['ours']:.3g} {one['unit']}".strip()
+        ours = "-" if one["ours"] is None else f"{one['ours']:.4g} {one['unit']}".strip()
         ratio = "-" if one["ratio"] is None else f"{one['ratio']:.2f}"
         rows.append(f"| {' | '.join((one['where'], one['claim'], paper, ours, ratio, one['state'], one['why'] or '-'))} |")
     return "\n".join(rows)
