@@ -1,9 +1,9 @@
 """Make gvpipe's sample animations; runs with the same libraries write the same bytes.
 
-`cloth.npz` and `creature.npz` hold `vertices` (F, V, 3) float32 in metres, y up, `faces` (T, 3) int32,
-counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame. `flag.npz` has two parts, quads,
-uv with a texture, normals with hard edges, and a field. `banner.mp4` has a picture for each of its frames. `voice.wav` is a
-tune with a click at each second.
+`cloth`, `creature`, `morphs`, `robot` and `soft_body.npz` hold `vertices` (F, V, 3) float32 in metres, y up, `faces`
+(T, 3) int32, counter-clockwise from outside, and `fps`. `ball_frames/` holds one OBJ file for each frame. `flag.npz` has
+two parts, quads, uv with a texture, normals with hard edges, and a field. `banner.mp4` has a picture for each of its frames.
+`voice.wav` is a tune with a click at each second.
 
     python make_samples.py [OUTPUT_FOLDER]
 """
@@ -21,10 +21,20 @@ from bounce import make_bounce
 from cloth import make_cloth
 from creature import make_creature
 from flag import make_flag
+from morphs import make_morphs
+from robot import make_robot
+from soft_body import make_soft_body
 from voice import write_voice
 
 import gvpipe
 
+SEQUENCES = {
+    "cloth": make_cloth,
+    "creature": make_creature,
+    "morphs": make_morphs,
+    "robot": make_robot,
+    "soft_body": make_soft_body,
+}
 GRID = 2.0**-13  # m; a power of two leaves the low bits of each float32 zero, which then compress
 
 
@@ -35,7 +45,7 @@ def main() -> None:
     parser.add_argument("output", nargs="?", type=Path, default=here, metavar="OUTPUT_FOLDER")
     folder: Path = parser.parse_args().output
     folder.mkdir(parents=True, exist_ok=True)
-    for name, make in (("cloth", make_cloth), ("creature", make_creature)):
+    for name, make in SEQUENCES.items():
         animation = make()
         write_npz(folder / f"{name}.npz", animation)
         report(f"{name}.npz", animation, (folder / f"{name}.npz").stat().st_size)

@@ -22,9 +22,8 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
     """The names of ``make_samples.py``, whose modules are gone afterwards."""
     monkeypatch.syspath_prepend(str(SAMPLES))
     yield runpy.run_path(str(SAMPLES / "make_samples.py"))
-    own = ("animation", "banner", "bounce", "cloth", "creature", "flag", "fox", "gait", "implicit", "polygonise", "voice")
-    for module in (*own, "splash"):
-        sys.modules.pop(module, None)
+    for path in SAMPLES.glob("*.py"):
+        sys.modules.pop(path.stem, None)
 
 
 def test_ball_frames_are_what_the_script_makes(script: dict[str, Any], tmp_path: Path) -> None:
@@ -70,10 +69,10 @@ def test_the_banner_is_what_the_script_makes(script: dict[str, Any], tmp_path: P
         assert np.array_equal(video.images[0].pictures.pixels(30), stored.pixels(30))  # copied
 
 
-@pytest.mark.parametrize("name", ["creature", pytest.param("cloth", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["creature", "morphs", "robot", "soft_body", pytest.param("cloth", marks=pytest.mark.slow)])
 def test_stored_sequences_are_what_the_script_makes(name: str, script: dict[str, Any], tmp_path: Path) -> None:
     """To a centimetre: where both diagonals of a quad are equally long, the last bit of a sum chooses one."""
-    script["write_npz"](tmp_path / "made.npz", script[f"make_{name}"]())
+    script["write_npz"](tmp_path / "made.npz", script["SEQUENCES"][name]())
     made, stored = gvpipe.read(tmp_path / "made.npz"), gvpipe.read(SAMPLES / f"{name}.npz")
     assert made.shape == stored.shape and made.fps == stored.fps
     assert np.abs(made[:] - stored[:]).max() < 0.01
@@ -102,6 +101,18 @@ def test_sample_is_one_piece_that_moves(name: str, closed: bool, frames: int) ->
     positions = sequence.read(0, frames)
     assert np.abs(np.diff(positions, axis=0)).max(axis=(1, 2)).min() > 0
     assert (SAMPLES / f"{name}.npz").stat().st_size < 2_000_000
+
+
+def test_robot_parts_are_rigid_and_half_of_the_face_is_still() -> None:
+    robot, face, pudding = (gvpipe.read(SAMPLES / f"{name}.npz") for name in ("robot", "morphs", "soft_body"))
+    edges = unique_edges(robot.faces)
+    lengths = np.linalg.norm(np.diff(robot.read(0, 120)[:, edges], axis=2)[:, :, 0], axis=2)  # (F, E)
+    assert np.ptp(lengths, axis=0).max() < 3 * 2.0**-13  # their rounding
+    moves = np.ptp(face.read(0, 96), axis=0).any(axis=1)
+    assert 0.2 < moves.mean() < 0.5
+    assert components(adjacency(pudding.faces, pudding.n_vertices))[0] == 1
+    assert 2 * len(unique_edges(pudding.faces)) == 3 * len(pudding.faces)
+    assert sum((SAMPLES / f"{name}.npz").stat().st_size for name in ("robot", "morphs", "soft_body")) < 700_000
 
 
 def test_body_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

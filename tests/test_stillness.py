@@ -19,6 +19,8 @@ from gvpipe.coding.registry import codec_class, encode_sequence, open_reader
 from gvpipe.coding.repeated_frames import RepeatedFrames, find_repeated_frames, read_repeated_frames
 from gvpipe.foundation.errors import CorruptFile
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.testing import Subject
+from gvpipe.testing.promises import coincident_vertices, held_frames, still_vertices
 from gvpipe.trajectory.still_vertices import find_still
 
 AWKWARD = awkward()
@@ -54,60 +56,25 @@ def with_each(name: str, values: tuple[Any, Any]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize(("codec", "settings", name), cases, ids=str)
 
 
-def with_copies() -> MeshSequence:
-    """The partly still sheet, and a second copy of each of its vertices and triangles."""
-    one = partly_still()
-    frames = np.asarray(one.positions[:])
-    return MeshSequence(np.concatenate([frames, frames], axis=1), np.concatenate([one.faces, one.faces + one.n_vertices]))
-
-
 def encode(sequence: MeshSequence, folder: Path, codec: str, settings: dict[str, Any], **more: Any) -> gvpipe.Player:
     gvpipe.encode(sequence, folder / "a.mp4", codec, **settings, **more)
     return gvpipe.open(folder / "a.mp4")
 
 
-def assert_random_access(video: gvpipe.Player, path: Path) -> None:
-    """Frames on their own, last to first and from the middle, are those of the whole, bit for bit."""
-    whole = video[:]
-    other = gvpipe.open(path)
-    for frame in (len(whole) - 1, len(whole) // 2, 0):
-        assert np.array_equal(other[frame : frame + 1][0], whole[frame])
-    assert np.array_equal(gvpipe.open(path)[3:9], whole[3:9])
-
-
 @with_each("bound", (None, "0.2%"))
 def test_still_vertices_stand_still(codec: str, settings: dict[str, Any], bound: str | None, tmp_path: Path) -> None:
-    sequence = partly_still()
-    still = find_still(sequence)
-    assert 70 < still.sum() < 90
-    video = encode(sequence, tmp_path, codec, settings, max_error=bound)
-    frames = video[:]
-    assert (frames[:, still] == frames[:1, still]).all()
-    assert (frames[:, ~still] != frames[:1, ~still]).any(axis=(0, 2)).mean() > 0.9
-    source = np.asarray(sequence.positions[:], np.float64)
-    diagonal = np.linalg.norm(np.ptp(source[0], axis=0))
-    assert np.linalg.norm(frames - source, axis=2).max() < (0.002 if bound else 0.01) * diagonal
-    assert_random_access(video, tmp_path / "a.mp4")
+    assert 70 < find_still(partly_still()).sum() < 90
+    still_vertices(Subject(codec_class(codec)(**settings), tmp_path), bound)
 
 
 @with_each("bound", (None, "0.2%"))
 def test_coincident_vertices_coincide(codec: str, settings: dict[str, Any], bound: str | None, tmp_path: Path) -> None:
-    sequence = with_copies()
-    frames = encode(sequence, tmp_path, codec, settings, max_error=bound)[:]
-    half = sequence.n_vertices // 2
-    assert np.array_equal(frames[:, :half], frames[:, half:])
+    coincident_vertices(Subject(codec_class(codec)(**settings), tmp_path), bound)
 
 
 @with_each("bound", (None, "0.2%"))
 def test_repeated_frames_are_identical(codec: str, settings: dict[str, Any], bound: str | None, tmp_path: Path) -> None:
-    lengths = [3, 1, 1, 2, 1, 1, 1, 9, 1, 1, 4]
-    sequence = held(waving(9, len(lengths)), lengths)
-    video = encode(sequence, tmp_path, codec, settings, max_error=bound)
-    frames = video[:]
-    assert frames.shape == (sum(lengths), 81, 3)
-    same = (frames[1:] == frames[:-1]).all(axis=(1, 2))
-    assert np.array_equal(same, np.diff(np.repeat(np.arange(len(lengths)), lengths)) == 0)
-    assert_random_access(video, tmp_path / "a.mp4")
+    held_frames(Subject(codec_class(codec)(**settings), tmp_path), bound)
 
 
 @with_each("target", ({"target_rmse": 1e-3}, {"max_error": "0.1%"}))

@@ -1,7 +1,8 @@
 """The public interface as text: python tools/list_interface.py writes tests/public_interface.txt.
 
-A line for each name of `gvpipe.__all__`, `gvpipe.errors` and `gvpipe.codec` with its signature, and for each public attribute
-and method of its classes. A test compares it with what there is, so that no name and no argument changes unnoticed.
+A line for each name of `gvpipe.__all__`, `gvpipe.errors`, `gvpipe.codec` and `gvpipe.testing` with its signature, and for each
+public attribute and method of its classes. A test compares it with what there is, so that no name and
+no argument changes unnoticed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 import gvpipe
 import gvpipe.codec
 import gvpipe.errors
+import gvpipe.testing
 
 TARGET = Path(__file__).parents[1] / "tests" / "public_interface.txt"
 
@@ -37,6 +39,7 @@ def _lines() -> Iterator[str]:
         (gvpipe, sorted(gvpipe.__all__)),
         (gvpipe.errors, sorted(name for name in vars(gvpipe.errors) if name[0].isupper())),
         (gvpipe.codec, sorted(name for name in vars(gvpipe.codec) if name[0].isupper())),
+        (gvpipe.testing, sorted(name for name in gvpipe.testing.__all__ if name != "PROMISES")),
     ):
         for name in names:
             value = getattr(module, name)

@@ -15,7 +15,7 @@ def grey_levels(picture: Pillow.Image) -> NDArray[np.uint16] | None:
     """Levels (height, width) of a grey picture of 16 bits, or None of any other. Older Pillow opens such a PNG as mode I."""
     if picture.mode != "I" and not picture.mode.startswith("I;16"):
         return None
-    return np.clip(np.asarray(picture), 0, 65535).astype(np.uint16)
+    return np.asarray(np.clip(np.asarray(picture), 0, 65535), np.uint16)
 
 
 def eight_bits(picture: Pillow.Image) -> Pillow.Image:

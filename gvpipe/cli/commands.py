@@ -20,6 +20,7 @@ import click
 from gvpipe import __version__
 from gvpipe.cli.audio_options import audio_options, parse_audio, sound_path, write_beside
 from gvpipe.cli.benchmarks import bench, plot
+from gvpipe.cli.codecs import codecs, new_codec
 from gvpipe.cli.console import Output, compress_option, is_verbose, output_options, texture_options, unlimited_option
 from gvpipe.cli.conversion import convert
 from gvpipe.cli.encode_all import encode_all
@@ -574,6 +575,8 @@ cli.add_command(convert)
 cli.add_command(encode_all)
 cli.add_command(bench)
 cli.add_command(plot)
+cli.add_command(codecs)
+cli.add_command(new_codec)
 
 
 @cli.command("export-html")
@@ -692,31 +695,6 @@ def render(source: str, target: str, size: str, limits: str | None, frames: str 
     n_bytes = os.path.getsize(target)
     out.json({"output": target, "width": pixels[0], "height": pixels[1], "bytes": n_bytes, "notes": notes})
     out.text(f"{shown(source, STDIN)} -> {target} ({pixels[0]}x{pixels[1]}, {_size(n_bytes)})")
-
-
-@cli.command()
-@output_options
-def codecs(out: Output) -> None:
-    """List the codecs and their settings, and the settings that --codec auto tries beside the defaults."""
-    import dataclasses
-
-    from gvpipe.coding.registry import codec_class, codec_ids
-    from gvpipe.rate_control.purposes import VARIANTS
-
-    with out.progress():
-        found = {name: codec_class(name) for name in codec_ids()}
-    settings = {name: {field.name: field.default for field in dataclasses.fields(codec)} for name, codec in found.items()}
-    variants = {name: [own for own in VARIANTS.get(name, ()) if own] for name in found}
-    values = [
-        {"id": name, "version": codec.version, "summary": codec.summary, "settings": settings[name], "variants": variants[name]}
-        for name, codec in found.items()
-    ]
-    out.json({"codecs": values})
-    for name, codec in found.items():
-        defaults = " ".join(f"{key}={value}" for key, value in settings[name].items())
-        out.text(f"{name}: {codec.summary}; {defaults}")
-        for own in variants[name]:
-            out.text(f"  --codec auto tries too: {' '.join(f'{key}={value}' for key, value in own.items())}")
 
 
 @cli.command()

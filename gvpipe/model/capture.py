@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate
+from typing import Any
 
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.errors import InputError
@@ -100,6 +101,17 @@ class Capture:
             first, last = max(start - begin, 0), min(stop - begin, length)
             if first < last:
                 yield number, first, last
+
+    def _repr_html_(self) -> str:
+        from gvpipe.model.notebook import card
+
+        numbers = {"frames": str(len(self)), "shots": str(len(self.shots)), "frames per second": f"{self.fps:g}"}
+        return card(self.name, numbers, self.shots[0])
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
 
     def part(self, start: int, stop: int | None = None) -> Capture:
         """Frames ``start`` to ``stop``; they still load when they are read. Raises `InputError`: there are no such frames."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from gvpipe.foundation.errors import GvpipeError
 from gvpipe.metrics.comparison import Comparison
+from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.notebook.libraries import REMEDY, has_widgets, in_kernel
 from gvpipe.notebook.prepared import is_ready
@@ -21,7 +22,7 @@ def interactive(shown: Any, still: str) -> dict[str, Any] | None:
     """Show a player, and return what a saved notebook keeps of it; None where nothing but text or a still can be shown.
 
     Args:
-        shown: a sequence, a player, or a comparison, of which both sides play in step.
+        shown: a sequence, a capture, a player of either, or a comparison, of which both sides play in step.
         still: HTML that is shown, with what to do about it, where there is no player, and above the players of a comparison.
     """
     if not in_kernel():
@@ -44,8 +45,10 @@ def _is_large(source: Any) -> bool:
     """Whether a sequence takes long to encode; what files hold that are no videos is not looked at."""
     if isinstance(source, str | os.PathLike | list | tuple):
         return False
-    is_large = isinstance(source, MeshSequence) and source.n_frames * source.n_vertices > MOST_SAMPLES
-    return is_large and not is_ready(source, ERROR)
+    if not isinstance(source, MeshSequence | Capture):
+        return False
+    shots = [source] if isinstance(source, MeshSequence) else source.shots
+    return sum(shot.n_frames * shot.n_vertices for shot in shots) > MOST_SAMPLES and not is_ready(source, ERROR)
 
 
 def _with_hint(still: str, hint: str) -> dict[str, Any]:

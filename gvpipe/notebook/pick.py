@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64
-from gvpipe.playback.player import Player
+from gvpipe.notebook.prepared import Prepared
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +33,17 @@ class Pick:
     values: Mapping[str, float | Array]
 
 
-def read_pick(player: Player, message: Mapping[str, Any]) -> Pick | None:
+def read_pick(prepared: Prepared, message: Mapping[str, Any]) -> Pick | None:
     """The pick that a page tells of; None if the video has no such vertex, triangle or frame."""
-    vertex, triangle, frame = (message.get(name) for name in ("vertex", "triangle", "frame"))
-    sizes = player.shape[1], len(player.faces), len(player)
-    for value, size in zip((vertex, 0 if triangle is None else triangle, frame), sizes, strict=True):
+    vertex, triangle, shown = (message.get(name) for name in ("vertex", "triangle", "frame"))
+    if not isinstance(shown, int) or not 0 <= shown < prepared.n_frames:
+        return None
+    player, frame = prepared.at(shown)
+    sizes = player.shape[1], len(player.faces)
+    for value, size in zip((vertex, 0 if triangle is None else triangle), sizes, strict=True):
         if not isinstance(value, int) or not 0 <= value < max(1, size):
             return None
-    assert isinstance(vertex, int) and isinstance(frame, int)
+    assert isinstance(vertex, int)
     rows = {"vertex": vertex, "triangle": triangle}
     values: dict[str, float | Array] = {}
     for name, field in player.fields.items():
@@ -49,4 +52,4 @@ def read_pick(player: Player, message: Mapping[str, Any]) -> Pick | None:
             value = np.asarray(field[frame])[row]
             values[name] = value if np.ndim(value) else float(value)
     part = next((part.name for part in player.parts if part.vertices[0] <= vertex < part.vertices[1]), None)
-    return Pick(vertex, triangle, part, frame, player[frame][vertex] + player.origin, values)
+    return Pick(vertex, triangle, part, shown, player[frame][vertex] + player.origin, values)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,13 +17,18 @@ from gvpipe.api import encode, restream
 from gvpipe.coding.registry import browser_obstacle
 from gvpipe.container.bitstream import PLAIN, STREAM
 from gvpipe.container.mp4 import file_bytes
-from gvpipe.container.sources import VIDEO_SUFFIXES, BytesSource, FileSource, Source, is_remote
+from gvpipe.container.shot_layout import ShotIndex
+from gvpipe.container.sources import VIDEO_SUFFIXES, BytesSource, FileSource, Source, SourceWindow, is_remote
 from gvpipe.foundation.arguments import show
 from gvpipe.foundation.atomic import PREFIX, new_folder, remove_abandoned_folders, remove_folder
+from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.notes import count
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import measure_errors
-from gvpipe.model.sequence import MeshSequence
-from gvpipe.playback.files import read
+from gvpipe.model.capture import Capture
+from gvpipe.model.sequence import MeshSequence, describe
+from gvpipe.playback.capture_player import CapturePlayer
+from gvpipe.playback.files import read_capture
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.targets import parse_bound
 from gvpipe.rendering.poster import poster_of
@@ -38,15 +44,38 @@ class Prepared:
 
     Args:
         name: of what was given.
-        player: of the file that is shown.
+        player: of the file that is shown; of a capture, of its first shot.
         source: the file's bytes.
         note: what was done to what was given, one line; "" if it is shown as it is.
+        row: all shots of a capture.
     """
 
     name: str
     player: Player
     source: Source
     note: str = ""
+    row: CapturePlayer | None = None
+
+    @property
+    def n_frames(self) -> int:
+        """F, the number of frames."""
+        return len(self.player if self.row is None else self.row)
+
+    @property
+    def shots(self) -> Sequence[MeshSequence]:
+        """What is shown, a shot each."""
+        return [self.player.sequence()] if self.row is None else self.row.capture().shots
+
+    def at(self, frame: int) -> tuple[Player, int]:
+        """The player of what a frame shows, and the frame's number there, for a frame in ``0..n_frames - 1``."""
+        if self.row is None:
+            return self.player, frame
+        number, own = self.row.capture().locate(frame)
+        return self.row.shot(number), own
+
+    def described(self) -> str:
+        """The name and the numbers of what is shown."""
+        return f"{self.name}: {describe(self.player.sequence())}" if self.row is None else repr(self.row.capture())[1:-1]
 
     @property
     def is_large(self) -> bool:
@@ -58,14 +87,14 @@ class Prepared:
         return self.source.read(0, self.source.size)
 
 
-_encodings: weakref.WeakKeyDictionary[MeshSequence, dict[float | str, Prepared]] = weakref.WeakKeyDictionary()
+_encodings: weakref.WeakKeyDictionary[MeshSequence | Capture, dict[float | str, Prepared]] = weakref.WeakKeyDictionary()
 
 
 def prepare(given: Any, error: float | str, progress: Progress | None = None, *, unlimited: bool = False) -> Prepared:
-    """Make a geometry video for browsers of a player, a sequence, or the path of either.
+    """Make a geometry video for browsers of a player, a sequence, a capture, or the path of any.
 
     Args:
-        given: `Player`, `MeshSequence` or what `gvpipe.read` takes.
+        given: `Player`, `CapturePlayer`, `MeshSequence`, `Capture` or what `gvpipe.read_capture` takes.
         error: most that a vertex may move by an encoding: model units, or a part of the diagonal such as ``"0.1%"``.
         progress: of an encoding.
         unlimited: as for `Player`, of a path.
@@ -75,26 +104,36 @@ def prepare(given: Any, error: float | str, progress: Progress | None = None, *,
         TypeError: it is none of these.
     """
     if isinstance(given, str | os.PathLike) and (is_remote(given) or os.fspath(given).lower().endswith(VIDEO_SUFFIXES)):
-        given = Player(given, unlimited=unlimited)
+        given = CapturePlayer(given, unlimited=unlimited)
     elif isinstance(given, str | os.PathLike | list | tuple):
-        given = read(given, unlimited=unlimited)
+        given = read_capture(given, unlimited=unlimited)
+    if isinstance(given, CapturePlayer):
+        if given.index is not None:
+            return _of_row(given, given.index)
+        given = given.shot(0)
+    if isinstance(given, Capture) and len(given.shots) == 1:
+        given = given.shots[0]
     if isinstance(given, MeshSequence):
         given = _player_behind(given) or given
     if isinstance(given, Player) and browser_obstacle(given.bitstream):
         given = given.sequence()
     if isinstance(given, Player):
         return _of_player(given)
-    if not isinstance(given, MeshSequence):
-        raise TypeError(f"gvpipe.show was given {show(given)}; a path, a Player or a MeshSequence is needed")
+    if not isinstance(given, MeshSequence | Capture):
+        raise TypeError(f"gvpipe.show was given {show(given)}; a path, a Player, a MeshSequence or a Capture is needed")
     known = _encodings.setdefault(given, {})
     if error not in known:
-        known[error] = _encoded(given, error, progress)
+        if isinstance(given, Capture):
+            known[error] = _encoded_row(given, error, progress)
+        else:
+            known[error] = _encoded(given, error, progress)
     return known[error]
 
 
-def is_ready(given: MeshSequence, error: float | str) -> bool:
+def is_ready(given: MeshSequence | Capture, error: float | str) -> bool:
     """Whether a sequence can be shown without an encoding."""
-    return _player_behind(given) is not None or error in _encodings.get(given, {})
+    is_decoded = isinstance(given, MeshSequence) and _player_behind(given) is not None
+    return is_decoded or error in _encodings.get(given, {})
 
 
 def _player_behind(sequence: MeshSequence) -> Player | None:
@@ -119,6 +158,25 @@ def _of_player(player: Player) -> Prepared:
     path = _temporary_file()
     restream(player.on_disk, path, STREAM, unlimited=True)
     return _holding(path, Prepared(player.path, player, FileSource(path)))
+
+
+def _of_row(row: CapturePlayer, index: ShotIndex) -> Prepared:
+    """The file of a capture as it is, whose index says where each shot lies."""
+    first = row.shot(0)
+    if obstacle := browser_obstacle(first.bitstream):
+        raise InputError(f"{row.path} has {obstacle}, which browsers do not play; encode it for browsers (--for web)")
+    return Prepared(row.path, first, SourceWindow(index.source, 0, index.size), row=row)
+
+
+def _encoded_row(capture: Capture, error: float | str, progress: Progress | None) -> Prepared:
+    """Encode each shot of a capture within an error."""
+    path, begun = _temporary_file(), time.perf_counter()
+    encode(capture, path, CODEC, progress, max_error=error, track=False)
+    row = CapturePlayer(path, unlimited=True)
+    source, seconds = FileSource(path), time.perf_counter() - begun
+    what = f"encoded by {CODEC} in {seconds:.1f} s: {show_bytes(source.size)} in {count(len(capture.shots), 'shot')}"
+    bound = error if isinstance(error, str) else f"{error:g}"
+    return _holding(path, Prepared(capture.name, row.shot(0), source, f"{what}; vertices move by at most {bound}", row))
 
 
 def _encoded(sequence: MeshSequence, error: float | str, progress: Progress | None) -> Prepared:

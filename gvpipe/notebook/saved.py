@@ -12,7 +12,6 @@ import html
 from gvpipe.foundation.errors import GvpipeError
 from gvpipe.foundation.text import escaped
 from gvpipe.model.notebook import png
-from gvpipe.model.sequence import describe
 from gvpipe.notebook.prepared import Prepared, show_bytes
 from gvpipe.web.export import page_text
 from gvpipe.web.page_view import PageView
@@ -64,7 +63,7 @@ def saved_html(
         height: of the player, pixels.
         embed: as for `is_embedded`.
     """
-    parts, words = [], [f"{prepared.name}: {describe(prepared.player.sequence())}"]
+    parts, words = [], [prepared.described()]
     if still is not None:
         text = base64.b64encode(still).decode("ascii")
         parts.append(

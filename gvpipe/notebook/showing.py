@@ -12,7 +12,7 @@ from gvpipe.notebook.prepared import prepare
 from gvpipe.notebook.progress_bar import ProgressBar
 from gvpipe.rendering.field_range import Range
 from gvpipe.web.export import AXES
-from gvpipe.web.page_view import page_view
+from gvpipe.web.page_view import view_of_shots
 
 if TYPE_CHECKING:
     from gvpipe.notebook.side_by_side import SideBySide
@@ -43,13 +43,13 @@ def show(
     embed: bool | None = None,
     unlimited: bool = False,
 ) -> PlayerWidget | SideBySide:
-    """Show a geometry video or a sequence in a notebook: an interactive player, whose traits Python reads and sets.
+    """Show a geometry video, a sequence or a capture in a notebook: an interactive player, whose traits Python reads and sets.
 
-    A geometry video is shown as it is. A sequence is encoded by codec ``pca`` first, once; ``widget.note`` says its error.
+    A geometry video is shown as it is. What is none is encoded by codec ``pca`` first, once; ``widget.note`` says its error.
     Of files above 8 MB the page fetches parts from the kernel when it needs them.
 
     Args:
-        source: `Player`, `MeshSequence` or what `read` takes, such as a path.
+        source: `Player`, `CapturePlayer`, `MeshSequence`, `Capture` or what `read_capture` takes, such as a path.
         others: to show beside it, with as many frames: they play and turn in step, as source and decoded.
         field, colormap, field_range, log, speed, warp, camera, shading: how it opens, as for `export_html`.
         parts: names of the parts to show; None: all.
@@ -87,19 +87,9 @@ def show(
         bar = ProgressBar(str(getattr(given, "name", given))[:LONGEST_NAME])
         prepared = prepare(given, error, bar, unlimited=unlimited)
         bar.finish(prepared.note)
-        sequence = prepared.player.sequence()
         if names is not None:
-            only_parts(sequence, names)
-        view = page_view(
-            sequence,
-            field=field,
-            colormap=colormap,
-            field_range=field_range,
-            log=log,
-            speed=speed,
-            warp=warp,
-            camera=camera,
-            shading=shading,
-        )
+            only_parts(prepared.player.sequence(), names)
+        options = {"colormap": colormap, "log": log, "speed": speed, "camera": camera, "shading": shading}
+        view = view_of_shots(prepared.shots, field, field_range, warp, **options)
         players.append(PlayerWidget(prepared, view, names, up, autoplay, loop, height, embed))
     return SideBySide(players) if others else players[0]

@@ -108,7 +108,7 @@ class PlayerWidget(anywidget.AnyWidget):
     @property
     def n_frames(self) -> int:
         """F, the number of frames."""
-        return len(self._prepared.player)
+        return self._prepared.n_frames
 
     def show_instead(self, prepared: Prepared) -> None:
         """Show another file in place of this one, such as one that is finished, from its first frame on."""
@@ -130,7 +130,7 @@ class PlayerWidget(anywidget.AnyWidget):
     @traitlets.validate("frame")
     def _check_frame(self, proposal: Any) -> int:
         frame: int = proposal["value"]
-        n_frames = len(self._prepared.player)
+        n_frames = self._prepared.n_frames
         if self._is_growing and frame >= 0:
             return frame
         if not -n_frames <= frame < n_frames:
@@ -147,7 +147,10 @@ class PlayerWidget(anywidget.AnyWidget):
     @traitlets.validate("field")
     def _check_field(self, proposal: Any) -> str | None:
         field: str | None = proposal["value"]
-        return field if field is None else _known(field, self._prepared.player.fields, f"{self.name} has no field")
+        if field is None:
+            return None
+        known = dict.fromkeys(name for shot in self._prepared.shots for name in shot.fields)
+        return _known(field, known, f"{self.name} has no field")
 
     @traitlets.validate("range")
     def _check_range(self, proposal: Any) -> tuple[float, float] | None:
@@ -174,7 +177,7 @@ class PlayerWidget(anywidget.AnyWidget):
         kind = message.get("kind") if isinstance(message, dict) else None
         if kind == "range":
             self._send_range(message)
-        elif kind == "pick" and (pick := read_pick(self._prepared.player, message)):
+        elif kind == "pick" and (pick := read_pick(self._prepared, message)):
             self._picked(pick)
 
     def _send_range(self, message: dict[str, Any]) -> None:
@@ -198,7 +201,7 @@ class PlayerWidget(anywidget.AnyWidget):
         return self.saved()
 
     def __repr__(self) -> str:
-        return f"<PlayerWidget {self.name}: frame {self.frame} of {len(self._prepared.player)}>"
+        return f"<PlayerWidget {self.name}: frame {self.frame} of {self._prepared.n_frames}>"
 
 
 def show_widget(widget: Any) -> None:

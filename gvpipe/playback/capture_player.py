@@ -132,6 +132,14 @@ class CapturePlayer:
     def __repr__(self) -> str:
         return f"<CapturePlayer {self.path}: {repr(self.capture()).removeprefix(f'<Capture {self.path}: ').removesuffix('>')}>"
 
+    def _repr_html_(self) -> str:
+        return self.capture()._repr_html_()
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        from gvpipe.model.notebook import mimebundle
+
+        return mimebundle(self)
+
     def __enter__(self) -> CapturePlayer:
         return self
 

@@ -37,10 +37,9 @@ from gvpipe.playback.capture_player import CapturePlayer
 from gvpipe.playback.player import Player
 from gvpipe.rate_control.purposes import SERVES, WEB
 from gvpipe.rate_control.trials import Trial, Trials
-from gvpipe.rendering.field_range import Range
 from gvpipe.rendering.poster import poster_of
 from gvpipe.web.asset_export import carry_asset
-from gvpipe.web.page_view import PageView, page_view
+from gvpipe.web.page_view import PageView, view_of_shots
 
 SUFFIXES = (".html", ".htm")
 AXES = ("y", "z")
@@ -140,7 +139,7 @@ def export_html(
         found = shots[0].metadata.up_axis
         up = found if found in AXES else "y"
     options = {"colormap": colormap, "log": log, "speed": speed, "clip": clip, "camera": camera, "shading": shading}
-    view = _view_of(shots, field, field_range, warp, options)
+    view = view_of_shots([shot.sequence() for shot in shots], field, field_range, warp, **options)
     view = replace(view, muted=any(video.sound is not None for video in videos))
     if len(shots) > 1 or videos[0].index:
         report = _write_page(videos[0].path, _row(videos, shots, convert), target, up, view)
@@ -162,19 +161,6 @@ def export_html(
     return ExportReport(
         page.bytes, page.video_bytes, obstacle or _kind(player.bitstream), added.rmse_diag, added.max_diag, added.kg
     )
-
-
-def _view_of(
-    shots: Sequence[Player], field: str | None, field_range: Range, warp: str | None, options: dict[str, Any]
-) -> PageView:
-    """How the page opens: what is asked of fields is looked up in the shots that have them, and colours span all of these."""
-    having = [shot for shot in shots if field in shot.fields] or list(shots[:1])
-    moving = next((shot for shot in shots if warp is not None and warp.partition(":")[0] in shot.fields), having[0])
-    warped = page_view(moving.sequence(), warp=warp).warp
-    views = [page_view(shot.sequence(), field=field, field_range=field_range, **options) for shot in having]
-    ends = [view.limits for view in views if view.limits is not None]
-    limits = (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
-    return replace(views[0], limits=limits, warp=warped)
 
 
 def _row(videos: Sequence[CapturePlayer], shots: Sequence[Player], convert: bool) -> bytes:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import html
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -177,3 +179,16 @@ def _numbers(pair: tuple[float, float] | None) -> str | None:
 def _number(value: float) -> str:
     """Digits that give the number back, in Python and in JavaScript."""
     return repr(float(value)).removesuffix(".0")
+
+
+def view_of_shots(
+    shots: Sequence[MeshSequence], field: str | None, field_range: Range, warp: str | None, **options: Any
+) -> PageView:
+    """How the page opens: what is asked of fields is looked up in the shots that have them, and colours span all of these."""
+    having = [shot for shot in shots if field in shot.fields] or list(shots[:1])
+    moving = next((shot for shot in shots if warp is not None and warp.partition(":")[0] in shot.fields), having[0])
+    warped = page_view(moving, warp=warp).warp
+    views = [page_view(shot, field=field, field_range=field_range, **options) for shot in having]
+    ends = [view.limits for view in views if view.limits is not None]
+    limits = (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+    return replace(views[0], limits=limits, warp=warped)

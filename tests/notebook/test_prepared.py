@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from folders import SAMPLES
 from sequences import waving
 
 import gvpipe
@@ -85,7 +86,7 @@ def test_temporary_files_go_with_what_they_are_for(monkeypatch: pytest.MonkeyPat
 
 
 def test_what_cannot_be_shown(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="a path, a Player or a MeshSequence is needed"):
+    with pytest.raises(TypeError, match="a Player, a MeshSequence or a Capture is needed"):
         prepare(3, "0.1%")
     with pytest.raises(InputError, match="no such file"):
         prepare(tmp_path / "none.mp4", "0.1%")
@@ -99,7 +100,7 @@ def test_a_pick_has_the_values_of_the_file(tmp_path: Path) -> None:
     sequence = gvpipe.MeshSequence(np.add(sheet[:], [1e6, 0, 0]), sheet.faces, fields=fields)
     gvpipe.encode(sequence, tmp_path / "a.mp4", "pca")
     player = gvpipe.open(tmp_path / "a.mp4")
-    pick = read_pick(player, {"vertex": 7, "triangle": 3, "frame": 2, "part": None})
+    pick = read_pick(prepare(player, 1.0), {"vertex": 7, "triangle": 3, "frame": 2, "part": None})
     assert pick and (pick.vertex, pick.triangle, pick.frame, pick.part) == (7, 3, 2, None)
     assert pick.position == pytest.approx(sequence.read_absolute(2, 3)[0, 7], abs=0.05) and pick.position[0] > 9e5
     assert pick.values["height"] == player.fields["height"][2][7] and pick.values["flux"] == player.fields["flux"][2][3]
@@ -112,4 +113,22 @@ def test_a_pick_has_the_values_of_the_file(tmp_path: Path) -> None:
      {"vertex": 0, "frame": 0, "triangle": 128}, {"vertex": 0.5, "frame": 0}, {"vertex": 0}],
 )  # fmt: skip
 def test_picks_of_what_is_not_there_are_ignored(message: dict[str, Any], video: Path) -> None:
-    assert read_pick(gvpipe.open(video), message) is None
+    assert read_pick(prepare(video, 1.0), message) is None
+
+
+def test_a_capture_is_encoded_and_picked_by_its_shots(tmp_path: Path) -> None:
+    capture = gvpipe.read_capture(SAMPLES / "splash")
+    for given in (SAMPLES / "splash", capture):
+        shown = prepare(given, "0.5%")
+        assert shown.n_frames == 12 and shown.row is not None and shown.row.lengths == capture.lengths
+        assert re.fullmatch(r"encoded by pca in [\d.]+ s: \d+ kB in 8 shots; vertices move by at most 0.5%", shown.note)
+    assert prepare(capture, "0.5%") is shown
+    assert shown.described().startswith("Capture") and "12 frames in 8 shots" in shown.described()
+    last = capture.shots[-1].n_vertices - 1
+    assert read_pick(shown, {"vertex": last, "frame": 12}) is None
+    pick = read_pick(shown, {"vertex": last, "frame": 11})
+    assert pick and pick.frame == 11 and np.linalg.norm(pick.position - capture.shots[-1][0], axis=1).min() < 0.01
+    (tmp_path / "splash.mp4").write_bytes(shown.data())
+    for opened in (tmp_path / "splash.mp4", gvpipe.open_capture(tmp_path / "splash.mp4")):
+        assert prepare(opened, "0.5%").data() == shown.data() and not prepare(opened, "0.5%").note
+    assert '<td style="text-align:left">8</td>' in gvpipe.open_capture(tmp_path / "splash.mp4")._repr_html_()

@@ -233,6 +233,23 @@ widget.read_range = lambda prepared, start, stop: asked.append((start, stop)) or
         run_cell(notebook, "prepared.MOST_AT_ONCE = 8 << 20; widget.read_range = read")
 
 
+@pytest.mark.parametrize("most_at_once", [8 << 20, 1000])
+def test_a_capture_plays_over_its_shots(notebook: Any, folder: Path, samples: Path, most_at_once: int) -> None:
+    """Sent as a whole, and by parts."""
+    shutil.copytree(samples / "splash", folder / "splash", dirs_exist_ok=True)
+    run_cell(notebook, f"import gvpipe.notebook.prepared as prepared; prepared.MOST_AT_ONCE = {most_at_once}")
+    try:
+        _show(notebook, "gvpipe.show('splash', error='0.5%', autoplay=False)")
+        assert _settled(notebook, "[w._data is None, w.n_frames]") == [most_at_once == 1000, 12]
+        assert in_player(notebook, "return element.video.frameCount") == 12
+        run_cell(notebook, "w.frame = 11")
+        in_player(notebook, "await until(() => element.currentFrame === 11 && !element.seeking);")
+        in_player(notebook, "await element.play(); await until(() => element.currentFrame > 2 && element.currentFrame < 11);")
+        assert "in 8 shots" in run_cell(notebook, "print(w.note)")
+    finally:
+        run_cell(notebook, "prepared.MOST_AT_ONCE = 8 << 20")
+
+
 def test_a_recording_shows_itself_while_it_grows(notebook: Any) -> None:
     """The kernel is busy with the loop, and answers no page."""
     in_player(notebook, "await jupyterapp.commands.execute('notebook:clear-all-cell-outputs');")

@@ -1,0 +1,1 @@
+"""A package with a codec, which `gvpipe.testing.new_codec` writes under another name."""
