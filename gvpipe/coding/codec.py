@@ -198,6 +198,13 @@ class Codec(Protocol):
         """Return the skeleton that moves a bitstream's vertices, as far as it goes; None: it has none; raises `CorruptFile`."""
         ...
 
+    def find_skin(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Skin | None:
+        """Return joints and weights that would leave about the error of its quality; nothing is coded. None: it has none.
+
+        Arguments are those of `encode`. Joints rest: their transforms are for others to fit, from the first frame as bind pose.
+        """
+        ...
+
     @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """Return what each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
@@ -260,6 +267,10 @@ class BaseCodec:
     @classmethod
     def skin(cls, bitstream: Bitstream) -> Skin | None:
         """The skeleton of its files; see `Codec.skin`. Here: none."""
+        return None
+
+    def find_skin(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Skin | None:
+        """Joints and weights for a sequence; see `Codec.find_skin`. Here: none."""
         return None
 
     @classmethod
