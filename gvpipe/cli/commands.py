@@ -28,6 +28,7 @@ from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_sett
 from gvpipe.cli.page_options import page_options
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, collect_seldom, ending_by_exception, replace_closed_streams
+from gvpipe.cli.reproduction import fetch_data, reproduce
 from gvpipe.foundation.atomic import remove_abandoned_folders
 from gvpipe.foundation.errors import GvpipeError, InputError, TopologyChange
 from gvpipe.foundation.text import escaped
@@ -588,6 +589,8 @@ def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None]
 cli.add_command(convert)
 cli.add_command(encode_all)
 cli.add_command(bench)
+cli.add_command(reproduce)
+cli.add_command(fetch_data)
 cli.add_command(plot)
 cli.add_command(codecs)
 cli.add_command(new_codec)
