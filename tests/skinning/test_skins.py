@@ -640,6 +640,22 @@ def test_what_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_what_no_skeleton_can_do(tmp_path: Path, run: Any) -> None:
+    """An error that none holds is said with what is reached; one joint is a skeleton; more than glTF numbers are refused."""
+    source = _saved(waving(4, 5), tmp_path)
+    ended = run("convert", source, tmp_path / "a.glb", "--skin", "--joints", "1", "--target-kg", "1e-9", "--correctives", "0")
+    assert ended.status == 0 and "a skeleton of one joint moves it: KG" in ended.err
+    assert "no skeleton that was tried holds the error asked for; allow more" in ended.err
+    skin = gvpipe.skin(waving(4, 5), joints=1)
+    wide = replace(skin, transforms=np.tile(np.eye(4), (5, 65537, 1, 1)))
+    with pytest.raises(InputError, match="65537 joints; glTF holds 65536"):
+        gvpipe.write(waving(4, 5), tmp_path / "b.glb", skin=wide)
+    point = MeshSequence(np.zeros((3, 1, 3), np.float32), np.zeros((0, 3), np.int32), 24)
+    with pytest.raises(InputError, match="no triangles"):
+        gvpipe.write(point, tmp_path / "b.glb", skin=gvpipe.skin(point))
+    assert not (tmp_path / "b.glb").exists()
+
+
 def test_still_and_small_sequences(tmp_path: Path) -> None:
     still = replace(waving(4, 5), positions=np.broadcast_to(waving(4, 5).read(0, 1), (5, 16, 3)).copy())
     skin = gvpipe.skin(still)
