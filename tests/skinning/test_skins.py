@@ -718,6 +718,9 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert [each["joints"] > 0 for each in json.loads(ended.out)["files"]] == [True, True, False]
     assert [gvpipe.read(tmp_path / f"shots-00{k}.glb").n_frames for k in range(3)] == [5, 4, 1]
     assert "shots-001.glb: a skeleton of" in ended.err
+    gvpipe.write(waving(40, 60), tmp_path / "heavy.npz")
+    ended = run("convert", tmp_path / "heavy.npz", tmp_path / "heavy.glb")
+    assert "lighter with --skin (within --target-kg) and --compress meshopt" in ended.err
     ended = run("convert", tmp_path / "in.npz", tmp_path / "i.glb", "--skin", "--joints", "8", "--frames", "0:2")
     assert ended.status == 0 and "leave out --skin" in ended.err
     assert "no skeleton that was tried" not in ended.err  # no error was asked for
