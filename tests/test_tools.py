@@ -32,3 +32,28 @@ def test_tables_of_data_sets_are_those_of_the_results() -> None:
     results = ROOT / "docs" / "benchmarks" / "datasets"
     for line in runpy.run_path(str(ROOT / "tools" / "measure_datasets.py"))["tables"](results):
         assert line in page
+
+
+def test_files_that_grew() -> None:
+    """More than two percent, or no file at all; what the last release did not measure never fails."""
+    tool = runpy.run_path(str(ROOT / "tools" / "compare_sizes.py"))
+    released = [{"sequence": "cow", "codec": codec, "bytes": 1000} for codec in ("mcgv", "pca", "pdct")]
+    rows = [
+        {"sequence": "cow", "codec": "mcgv", "bytes": 1020},
+        {"sequence": "cow", "codec": "pca", "bytes": 1021},
+        {"sequence": "cow", "codec": "pdct", "bytes": None, "reason": "too many components"},
+        {"sequence": "dog", "codec": "mcgv", "bytes": 9999},
+    ]
+    assert tool["find_grown"](rows, released) == ["cow pca", "cow pdct"]
+    assert tool["find_grown"](rows, []) == []
+    assert [row["bytes"] for row in tool["merged"](released, rows[1:2]).values()] == [1000, 1021, 1000]
+    for path, sequence in zip(tool["find_sequences"](None, ["cloth", "flag"]), ("cloth", "flag"), strict=True):
+        assert path.stem == sequence
+
+
+def test_sizes_of_the_last_release_are_figures() -> None:
+    tool = runpy.run_path(str(ROOT / "tools" / "compare_sizes.py"))
+    rows = tool["read_rows"](tool["RELEASED"])
+    assert rows and all(set(row) == {"sequence", "codec", "bytes", "bpvf", "kg", "seconds"} for row in rows)
+    assert {row["codec"] for row in rows} <= set(tool["CODECS"])
+    assert tool["find_grown"](rows, rows) == []

@@ -163,6 +163,7 @@ class Codec(Protocol):
     seconds_per_vertex: ClassVar[float]
     has_levels: ClassVar[bool]
     codes_live: ClassVar[bool]
+    competes: ClassVar[bool]
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     @property
@@ -231,6 +232,7 @@ class BaseCodec:
         seconds_per_vertex: that its reader asks for (`gvpipe.foundation.budget`), at least.
         has_levels: its files have levels of detail.
         codes_live: it codes frames as they come (`start_live`).
+        competes: ``--codec auto`` takes it into account, where it is installed.
     """
 
     id: ClassVar[str]
@@ -243,6 +245,7 @@ class BaseCodec:
     seconds_per_vertex: ClassVar[float] = 12e-6
     has_levels: ClassVar[bool] = False
     codes_live: ClassVar[bool] = False
+    competes: ClassVar[bool] = True
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

@@ -9,8 +9,11 @@ squared error and bits.
 A cluster costs twelve numbers a frame, or where motion has few principal trajectories four for each of these. So it should
 save a squared error: numbers of clusters are tried from the smallest up, until error and cost together fall no more. K-means
 is a draw of luck, and sees what is alike, not what a blend lacks. So each number is tried twice: by k-means, and by adding
-clusters to the blend before where its errors are. The best of either kind, weights' bits counted, goes on to the end, and the
-one that costs less there is kept. The search ends at the first number where neither start gains much on the best before.
+clusters to the blend before where its errors are. The one that costs less goes on, weights' bits counted. The search ends at
+the first number where neither start gains much on the best before.
+
+By then some parts of the surface have more clusters than they need, since others lacked some. So clusters are merged
+(`cluster_merging`), many at first, with turns of weights and transforms in between, as long as the blend costs less.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ import numpy as np
 from scipy import sparse
 
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
+from gvcodecs.mcgv.motion.cluster_merging import merge
 from gvcodecs.mcgv.motion.point_motions import Motions, SampledMotions
 from gvcodecs.mcgv.motion.segmentation import SEED
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
@@ -34,7 +38,7 @@ from gvpipe.mesh.topology import k_ring
 if TYPE_CHECKING:
     from gvcodecs.mcgv.motion.weight_selection import PointMotions
 
-TRIAL_PASSES, FIRST_PASSES, LAST_PASSES = 4, 2, 8  # turns of weights and transforms: per trial, for either start, for the best
+TRIAL_PASSES, MERGE_PASSES, LAST_PASSES = 4, 3, 8  # turns of weights and transforms: per trial, after merges, for the best
 FEWEST, MOST = 8, 1024  # clusters tried
 LEAST_POINTS = 8  # per cluster, on average
 MOST_DISTANCES = 1_500_000  # of points from clusters: beyond, k-means takes longer than it is worth
@@ -44,13 +48,16 @@ GROWTH = (
     (0, 2**0.5),
 )  # from one number tried to the next, by how many times its clusters' cost all costs
 ROUNDS = 3  # steps tried
-AIM = 0.88  # of the target error, what a blend is to leave: coding adds to it
+AIM = 0.78  # of the target error, what a blend is to leave: coding adds to it
 CLOSE = 0.18  # logarithm of the error left over that
 SLOPE = 0.75  # of its logarithm over the step's
 MOST_MOVED = 3.0  # times, the step at once
-PROMISING = 1.2  # times the cost of the best, up to which another blend goes on
-PATIENCE = 1  # numbers of clusters, in a row, that gain too little over smaller ones: then the search ends
 LEAST_GAIN = 0.015  # of the cost: where a number of clusters gains less, the next one does worse
+OVER = 1.15  # times the least cost, up to which the last number tried is taken in place of the best: merges gain more there
+MERGED = 32.0, 2.0  # costs of a cluster that a merge may add by its estimate: at first, and at last
+MERGED_LESS = 4.0  # times, after merges that gained too little
+MOST_MERGES = 8  # rounds of them
+LEAST_MERGE_GAIN = 0.005  # of the cost
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 
 
@@ -82,47 +89,55 @@ def settle(motions: Motions | SampledMotions, step: float, fitted: Fitted, passe
 
 def _search(motions: Motions, step: float, n_clusters: int, target_error: float, start: Fitted) -> tuple[Fitted, float]:
     """As `fit_blend`, from a blend on."""
-    starts = [start]
     for _ in range(ROUNDS):
         problem = motions.problem(step)
-        found = [] if n_clusters else _find_number(problem, motions, starts)
-        tried = _try_all(problem, found or starts, FIRST_PASSES)
-        best = min(tried, key=lambda trial: trial.cost)
-        starts = [trial.fitted for trial in tried]
+        found = problem.measure(start) if n_clusters else _find_number(problem, motions, start)
+        best, start = found if n_clusters else _merge_clusters(problem, found), found.fitted
         left = motions.error(problem, best, step)
         if not target_error or not left > 0 or abs(math.log(AIM * target_error / left)) < CLOSE:
             break
         step *= min(max((AIM * target_error / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
-    return _alternate(problem, best, LAST_PASSES), step
+    (last,) = _try_all(problem, [best], LAST_PASSES)
+    return min(best, last, key=lambda trial: trial.cost).fitted, step
 
 
-def _find_number(problem: Problem, motions: Motions, starts: list[Fitted]) -> list[Trial]:
-    """The blends, of as many clusters as pay, that cost least after a few turns: grown, and from k-means.
+def _find_number(problem: Problem, motions: Motions, start: Fitted) -> Trial:
+    """The blend, of more clusters than pay, that costs least after a few turns: grown, or from k-means.
 
-    ``starts`` are blends found for another step, or of one cluster: numbers from half of theirs up are tried, or from theirs
-    up where there are too many for k-means.
+    ``start`` is a blend found for another step, or of one cluster: numbers from that of its clusters up are tried.
+    What is merged is the last of them, unless it costs much more.
     """
     draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
-    last = min(map(problem.measure, starts), key=lambda trial: trial.cost)
-    best, least = [last, last], [np.inf, np.inf]
+    best = last = problem.measure(start)
+    least = np.inf
     most, most_clustered = min(MOST, len(problem.base) / LEAST_POINTS), MOST_DISTANCES / len(problem.base)
-    half = starts[0].n_clusters // 2
-    count = float(max(FEWEST, half if half <= most_clustered else starts[0].n_clusters))  # to grow to fewer changes nothing
-    idle = 0
-    while count <= most and problem.cluster_price * count < min(least) and idle < PATIENCE:
+    count = float(max(FEWEST, start.n_clusters))
+    gains = True
+    while count <= most and problem.cluster_price * count < least and gains:
         begun = [_grow(last, round(count), patches, draw)]
         if count <= most_clustered:
             begun.append(motions.start(round(count)))
-        tried = _try_all(problem, begun, TRIAL_PASSES)
-        costs = [trial.cost for trial in tried]
-        idle = 0 if min(costs) < (1 - LEAST_GAIN) * min(least) else idle + 1
-        for kind, cost in enumerate(costs):
-            if cost < least[kind]:
-                best[kind], least[kind] = tried[kind], cost
-        last = tried[int(np.argmin(costs))]
-        excess = min(costs) / (problem.cluster_price * count)
+        last = min(_try_all(problem, begun, TRIAL_PASSES), key=lambda trial: trial.cost)
+        gains = last.cost < (1 - LEAST_GAIN) * least
+        if last.cost < least:
+            best, least = last, last.cost
+        excess = last.cost / (problem.cluster_price * count)
         count *= next(growth for limit, growth in GROWTH if excess > limit)
-    return [trial for trial, cost in zip(best, least, strict=True) if cost <= PROMISING * min(least)]
+    return last if last.cost < OVER * least else best
+
+
+def _merge_clusters(problem: Problem, trial: Trial) -> Trial:
+    """A blend of fewer clusters that costs no more: many are merged at once, then fewer, with turns in between."""
+    limit = MERGED[0] * problem.cluster_price
+    for _ in range(MOST_MERGES):
+        begun = merge(problem, trial, limit)
+        (merged,) = _try_all(problem, [begun], MERGE_PASSES)
+        if merged.cost > (1 - LEAST_MERGE_GAIN) * trial.cost:
+            limit /= MERGED_LESS
+            if limit < MERGED[1] * problem.cluster_price or begun.n_clusters == trial.fitted.n_clusters:
+                return min(trial, merged, key=lambda each: each.cost)
+        trial = min(trial, merged, key=lambda each: each.cost)
+    return trial
 
 
 def _try_all(problem: Problem, starts: Sequence[Fitted | Trial], passes: int) -> list[Trial]:
@@ -141,6 +156,7 @@ def _grow(trial: Trial, n_clusters: int, patches: sparse.csr_array, draw: np.ran
             break
         point = int(np.searchsorted(total, draw.random() * total[-1], side="right"))
         patch = patches.indices[patches.indptr[point] : patches.indptr[point + 1]]
+        patch = patch[trial.errors[patch] >= trial.errors[patch].mean()]  # a small piece keeps its clusters where they suit
         clusters[patch], parts[patch] = 0, 0
         clusters[patch, 0], parts[patch, 0] = cluster, TOTAL
         errors[patch] = 0
