@@ -342,7 +342,7 @@ def test_draco_files_show_the_same(correctives: int, engine: str, tmp_path: Path
     assert ["not morph targets" in note for note in notes] == ([True] if correctives else [])
     assert (tmp_path / "small.glb").stat().st_size < (0.8 if correctives else 0.5) * (tmp_path / "plain.glb").stat().st_size
     frames, own = gvpipe.read(tmp_path / "small.glb").read(0, 24), skin.read(0, 24)
-    rows = cKDTree(own[5]).query(frames[5])[1]
+    rows: Any = cKDTree(own[5]).query(frames[5])[1]
     assert np.array_equal(np.sort(rows), np.arange(len(rows))) and np.array_equal(rows, np.sort(rows)) == bool(correctives)
     assert farthest(frames, own[:, rows]) < max(2e-5, 0.1 * skin.error)
     shown = [0, 1, 11, 23]
@@ -359,7 +359,7 @@ def test_draco_holds_what_lies_beside_positions(tmp_path: Path) -> None:
     assert [part.name for part in small.parts] == [part.name for part in plain.parts]
     assert len(small.faces) == len(plain.faces) and set(small.attributes) == set(plain.attributes) > {"uv", "color", "normal"}
     corners = [corner_rows(each) for each in (plain, small)]
-    assert max(cKDTree(one).query(other)[0].max() for one, other in (corners, corners[::-1])) < 0.02  # normals have 10 bits
+    assert max(np.max(cKDTree(one).query(other)[0]) for one, other in (corners, corners[::-1])) < 0.02  # normals have 10 bits
 
 
 def test_what_draco_does_not_hold_stays_as_it_is(tmp_path: Path) -> None:
