@@ -114,6 +114,7 @@ def convert(
         find_skin,
         parse_joints,
         read_clips,
+        smaller_with,
         smaller_without,
     )
     from gvpipe.io.writing import HOLD_VOLUMES, is_glb, takes_skin
@@ -166,6 +167,7 @@ def convert(
             found = found and replace(found, clips=clips)
             noticed = [*some.notes, *said, *files.write(sequence, path, start, found, compress)]
             noticed += smaller_without(path, sequence, compress) if found and not found.clips else []
+            noticed += [] if found else smaller_with(path, sequence, compress)
     except TopologyChange:
         if skin or lod or clip == ALL:
             raise

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gvpipe.playback.player import Player
 
 MAY_BE_SMALLER = 0.25  # of the largest size that targets may have: many vertices may stand still
+HEAVY = 1 << 20  # bytes of morph targets
 RIGID = "rigid"  # of --joints
 ALL = "all"  # clips, of --clip
 EXACT = 1e-5  # of the diagonal: a skeleton that is farther off is written on request alone
@@ -145,6 +146,16 @@ def read_clips(
     sequence, clips = join_clips(list(zip(names, found, strict=True)))
     notes = tuple(note for note in sequence.notes if not note.startswith("clip "))  # that others were not read
     return replace(sequence, notes=notes), clips
+
+
+def smaller_with(path: str, sequence: MeshSequence, compress: str) -> list[str]:
+    """A note where a file of morph targets is large: which options make a lighter one; nothing is tried."""
+    size = os.path.getsize(path) if is_glb(path) and sequence.n_frames > 1 else 0
+    if size < HEAVY:
+        return []
+    more = "--compress meshopt" if compress == "none" else ""
+    named = " and ".join(each for each in ("--skin (within --target-kg)", more) if each)
+    return [f"a morph target for each frame makes {size} bytes; lighter with {named}"]
 
 
 def smaller_without(path: str, sequence: MeshSequence, compress: str) -> list[str]:

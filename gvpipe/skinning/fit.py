@@ -212,10 +212,10 @@ class _Search:
             self.look(round(found.skin.joints * SOME), 1.0, again=True)
         while self.correctives and self.held:
             before = self.held
-            fewer = before.skin.joints // FEWER
+            fewer = max(before.skin.joints // FEWER, LEAST)
             spared = JOINT_BYTES * (before.skin.joints - fewer) * self.sequence.n_frames
             is_even = before.shapes_size > before.joints_size
-            if is_even or fewer < LEAST or spared <= 2 * SHAPE_BYTES * self.sequence.n_vertices:
+            if is_even or fewer >= before.skin.joints or spared <= 2 * SHAPE_BYTES * self.sequence.n_vertices:
                 return
             self.look(fewer, 1.0, again=True)
             if self.held is before:

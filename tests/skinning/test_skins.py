@@ -342,7 +342,7 @@ def test_draco_files_show_the_same(correctives: int, engine: str, tmp_path: Path
     assert ["not morph targets" in note for note in notes] == ([True] if correctives else [])
     assert (tmp_path / "small.glb").stat().st_size < (0.8 if correctives else 0.5) * (tmp_path / "plain.glb").stat().st_size
     frames, own = gvpipe.read(tmp_path / "small.glb").read(0, 24), skin.read(0, 24)
-    rows = cKDTree(own[5]).query(frames[5])[1]
+    rows: Any = cKDTree(own[5]).query(frames[5])[1]
     assert np.array_equal(np.sort(rows), np.arange(len(rows))) and np.array_equal(rows, np.sort(rows)) == bool(correctives)
     assert farthest(frames, own[:, rows]) < max(2e-5, 0.1 * skin.error)
     shown = [0, 1, 11, 23]
@@ -359,7 +359,7 @@ def test_draco_holds_what_lies_beside_positions(tmp_path: Path) -> None:
     assert [part.name for part in small.parts] == [part.name for part in plain.parts]
     assert len(small.faces) == len(plain.faces) and set(small.attributes) == set(plain.attributes) > {"uv", "color", "normal"}
     corners = [corner_rows(each) for each in (plain, small)]
-    assert max(cKDTree(one).query(other)[0].max() for one, other in (corners, corners[::-1])) < 0.02  # normals have 10 bits
+    assert max(np.max(cKDTree(one).query(other)[0]) for one, other in (corners, corners[::-1])) < 0.02  # normals have 10 bits
 
 
 def test_what_draco_does_not_hold_stays_as_it_is(tmp_path: Path) -> None:
@@ -640,6 +640,22 @@ def test_what_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_what_no_skeleton_can_do(tmp_path: Path, run: Any) -> None:
+    """An error that none holds is said with what is reached; one joint is a skeleton; more than glTF numbers are refused."""
+    source = _saved(waving(4, 5), tmp_path)
+    ended = run("convert", source, tmp_path / "a.glb", "--skin", "--joints", "1", "--target-kg", "1e-9", "--correctives", "0")
+    assert ended.status == 0 and "a skeleton of one joint moves it: KG" in ended.err
+    assert "no skeleton that was tried holds the error asked for; allow more" in ended.err
+    skin = gvpipe.skin(waving(4, 5), joints=1)
+    wide = replace(skin, transforms=np.tile(np.eye(4), (5, 65537, 1, 1)))
+    with pytest.raises(InputError, match="65537 joints; glTF holds 65536"):
+        gvpipe.write(waving(4, 5), tmp_path / "b.glb", skin=wide)
+    point = MeshSequence(np.zeros((3, 1, 3), np.float32), np.zeros((0, 3), np.int32), 24)
+    with pytest.raises(InputError, match="no triangles"):
+        gvpipe.write(point, tmp_path / "b.glb", skin=gvpipe.skin(point))
+    assert not (tmp_path / "b.glb").exists()
+
+
 def test_still_and_small_sequences(tmp_path: Path) -> None:
     still = replace(waving(4, 5), positions=np.broadcast_to(waving(4, 5).read(0, 1), (5, 16, 3)).copy())
     skin = gvpipe.skin(still)
@@ -702,6 +718,9 @@ def test_decode_and_convert(tmp_path: Path, run: Any) -> None:
     assert [each["joints"] > 0 for each in json.loads(ended.out)["files"]] == [True, True, False]
     assert [gvpipe.read(tmp_path / f"shots-00{k}.glb").n_frames for k in range(3)] == [5, 4, 1]
     assert "shots-001.glb: a skeleton of" in ended.err
+    gvpipe.write(waving(40, 60), tmp_path / "heavy.npz")
+    ended = run("convert", tmp_path / "heavy.npz", tmp_path / "heavy.glb")
+    assert "lighter with --skin (within --target-kg) and --compress meshopt" in ended.err
     ended = run("convert", tmp_path / "in.npz", tmp_path / "i.glb", "--skin", "--joints", "8", "--frames", "0:2")
     assert ended.status == 0 and "leave out --skin" in ended.err
     assert "no skeleton that was tried" not in ended.err  # no error was asked for

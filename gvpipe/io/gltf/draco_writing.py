@@ -81,7 +81,8 @@ def add_primitive(
         fine: the lattice of positions.
         in_order: all vertices of the mesh are kept, in their order; else those alone that the triangles have.
     """
-    used, corners = np.arange(len(positions)), faces.reshape(-1)
+    used: Array = np.arange(len(positions))
+    corners: Array = faces.reshape(-1)
     if not in_order:
         used, corners = np.unique(corners, return_inverse=True)
     given = positions[used]
