@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from gvpipe.foundation.errors import GvpipeError
     from gvpipe.grids.cells import Cells
     from gvpipe.grids.volume import Volume
+    from gvpipe.io.simulation.vtk_frames import to_pyvista, to_vtk
     from gvpipe.io.simulation.vtk_objects import from_pyvista, from_vtk
+    from gvpipe.io.trimesh_objects import to_trimesh
     from gvpipe.media.sound import Sound
     from gvpipe.media.sound_files import read_sound
     from gvpipe.metrics.comparison import Comparison
@@ -94,6 +96,9 @@ __all__ = [
     "restream",
     "show",
     "skin",
+    "to_pyvista",
+    "to_trimesh",
+    "to_vtk",
     "write",
 ]
 
@@ -110,6 +115,8 @@ _HOMES = {
     "gvpipe.batch.runs": ("BatchReport", "encode_all"),
     "gvpipe.foundation.errors": ("GvpipeError",),
     "gvpipe.io.simulation.vtk_objects": ("from_pyvista", "from_vtk"),
+    "gvpipe.io.simulation.vtk_frames": ("to_pyvista", "to_vtk"),
+    "gvpipe.io.trimesh_objects": ("to_trimesh",),
     "gvpipe.notebook": ("show",),
     "gvpipe.playback.capture_player": ("CapturePlayer",),
     "gvpipe.captures.files": ("write",),

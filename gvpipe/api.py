@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
@@ -362,6 +362,7 @@ def compare(
     progress: Callable[[int, int], None] | None = None,
     *,
     surface: bool | None = None,
+    metrics: str | Iterable[str] = (),
 ) -> Comparison:
     """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
@@ -373,10 +374,12 @@ def compare(
         progress: called with (frames done, frames in all) after each block.
         surface: True: the distance of the surfaces too, whose triangles need not correspond; False: never; None: where vertices
             do not correspond. Of captures, surfaces are compared.
+        metrics: more of them, by name: psnr, dame, fmpd, mesh, d1, d2, as a list or a text with commas. Each gives a number for
+            every frame and their mean in ``Comparison.metrics``. The last three compare surfaces.
 
     Raises:
         InputError: one cannot be read, they differ in their number of frames, vertices do not correspond and ``surface`` is
-            False, or surfaces are needed and one side has no triangles.
+            False, surfaces are needed and one side has no triangles, or no metric has such a name.
         TopologyChange: vertices or triangles of one change, and ``surface`` is False.
         TypeError: one of them is neither a sequence, a capture, a player nor a path.
 
@@ -391,23 +394,25 @@ def compare(
     """
     from gvpipe.metrics.comparison import compare as measure
     from gvpipe.metrics.comparison import compare_captures
+    from gvpipe.metrics.frame_metrics import check_metrics
 
+    names = check_metrics(metrics)
     given = {"reference": reference, "distorted": distorted}
     for role, one in given.items():
         if not isinstance(one, MeshSequence | Capture | Player | CapturePlayer | str | os.PathLike | list | tuple):
             raise TypeError(f"compare's {role} is {show(one)}; a MeshSequence, a Player or a path is needed")
     if isinstance(reference, Capture | CapturePlayer) or isinstance(distorted, Capture | CapturePlayer):
-        return compare_captures(_as_capture(reference), _as_capture(distorted), progress)
+        return compare_captures(_as_capture(reference), _as_capture(distorted), progress, metrics=names)
     try:
         both = [_as_sequence(one) for one in (reference, distorted)]
         if any(each.volume is not None for each in both):
             pairs = zip((reference, distorted), both, strict=True)
             both = [_as_sequence(one, volume=True) if each.volume is None else each for one, each in pairs]
-        return measure(both[0], both[1], progress, surface=surface).of(reference, distorted)
+        return measure(both[0], both[1], progress, surface=surface, metrics=names).of(reference, distorted)
     except TopologyChange:
         if surface is False:
             raise
-        return compare_captures(_as_capture(reference), _as_capture(distorted), progress)
+        return compare_captures(_as_capture(reference), _as_capture(distorted), progress, metrics=names)
 
 
 def _as_capture(given: MeshSequence | Capture | Player | CapturePlayer | Source) -> Capture:

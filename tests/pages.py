@@ -22,6 +22,28 @@ Object.assign(window, { GeometryVideo, GeometryVideoError });
 PLAYER_PAGE = """<!doctype html><link rel="icon" href="data:,">
 <style>html, body { margin: 0; height: 100% } geometry-video { height: 100%; --backdrop: #ff00ff }</style>
 <script type="module" src="player.js"></script><geometry-video></geometry-video>"""
+CLICK = """const canvas = element.shadowRoot.querySelector("canvas");
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const m = element.projection;
+    const pointer = (type, x, y) => canvas.dispatchEvent(new PointerEvent(type, {
+      pointerId: 1, button: 0, buttons: type === "pointerup" ? 0 : 1, clientX: x, clientY: y, bubbles: true, composed: true,
+      pointerType: "mouse", isPrimary: true }));
+    const place = ([x, y, z]) => {
+      const [a, b, , d] = [0, 1, 2, 3].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);
+      return [left + (a / d * 0.5 + 0.5) * width, top + (0.5 - b / d * 0.5) * height];
+    };
+    const box = element.shadowRoot.querySelector(".probe");
+    const click = async (point, drag = 0) => {
+      const told = new Promise((resolve) => {
+        element.addEventListener("probe", ({ detail }) => resolve(detail), { once: true });
+        setTimeout(() => resolve(null), 800);
+      });
+      const [x, y] = place(point);
+      pointer("pointerdown", x, y);
+      if (drag) pointer("pointermove", x + drag, y);
+      pointer("pointerup", x + drag, y);
+      return told;
+    };"""
 LOAD = """const ready = new Promise((resolve, reject) => {
       element.addEventListener("ready", resolve, { once: true });
       element.addEventListener("error", (event) => reject(event.detail), { once: true });

@@ -19,6 +19,9 @@ BABYLON.MeshoptCompression._Default = { // else it loads its decoder from a page
     return target;
   },
 };
+const { dracoModule, dracoBytes } = await import("./three_draco.mjs");
+const jsModule = () => dracoModule(`${folder}/three`)({ wasmBinary: dracoBytes(`${folder}/three`) });
+BABYLON.DracoDecoder._Default = new BABYLON.DracoDecoder({ numWorkers: 0, jsModule });
 const FRAMES_A_SECOND = 60; // in which its loader counts
 const scene = new Scene(new NullEngine());
 scene.useRightHandedSystem = true;

@@ -12,7 +12,11 @@ globalThis.self = globalThis; // pictures are made with what a page has
 const data = readFileSync(file);
 const bytes = data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength);
 const { MeshoptDecoder } = await load("examples/jsm/libs/meshopt_decoder.module.js");
-const { scene, animations } = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, "");
+const { dracoLoader } = await import("./three_draco.mjs");
+const draco = await dracoLoader(folder);
+const loader = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).setDRACOLoader(draco);
+const { scene, animations } = await loader.parseAsync(bytes, "");
+draco.dispose();
 const mixer = new THREE.AnimationMixer(scene);
 animations.forEach((clip) => mixer.clipAction(clip).setLoop(THREE.LoopOnce).play());
 animations.forEach((clip) => (mixer.clipAction(clip).clampWhenFinished = true));

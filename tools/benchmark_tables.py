@@ -8,7 +8,8 @@ A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``, NAME one o
 `gvpipe bench --json` writes (`gvpipe.benchmark.report.BenchReport`). A file may add to it: ``rates`` and
 ``kg_differences``, ``sted_differences`` where its points are rounded, ``targets`` (encodes to a given error), ``vdmc`` (the
 rates of another codec). What is null was not recorded. The folder ``scale`` has what `gvpipe bench --scale` writes
-(`gvpipe.benchmark.scale_report.ScaleReport`), and ``plan.json`` of ``tools/measure_plan.py``.
+(`gvpipe.benchmark.scale_report.ScaleReport`), and ``plan.json`` of ``tools/measure_plan.py``. The folder ``reproduction`` has
+what `gvpipe reproduce` writes (`gvpipe.benchmark.reproduction.reproduce.Reproduction`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from typing import Any
 from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
 from gvpipe.benchmark.growth import exponents, fit_line
 from gvpipe.benchmark.report import BenchReport
+from gvpipe.benchmark.reproduction.claims import FAILS, HOLDS, NOT_RUN
+from gvpipe.benchmark.reproduction.reproduce import table as reproduction_table
 from gvpipe.benchmark.scale import FEW_FRAMES
 from gvpipe.benchmark.scale_plots import draw, row_of
 from gvpipe.benchmark.scale_report import ScalePoint, ScaleReport
@@ -33,6 +36,7 @@ from gvpipe.benchmark.tables import tables
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = (
     DOCS / "benchmarks.md",
+    DOCS / "reproduction.md",
     DOCS / "scale.md",
     DOCS / "codecs" / "mcgv.md",
     DOCS / "experiments" / "benchmark-curves-version-2.md",
@@ -45,6 +49,12 @@ NAMES = {
     "mcgv:prediction=blended": "`mcgv` blended",
     "mcgv:prediction=blended:transform=klt": "`mcgv` klt",
 }  # others: their own
+SYSTEMS = (
+    *("mcgv", "mcgv:prediction=affine", "mcgv:prediction=affine:image=jpeg", "pca", "laplacian", "pdct"),
+    *("pca:predictor=rbf", "pca:predictor=navg", "laplacian:operator=mean-value:delta_prediction=rigid", "pdct:clusters=40"),
+    *("afxic", "coddyac", "cpca", "d3dmc", "dynapack", "dynapack:predictor=replica", "dynapack:predictor=space"),
+    *("kglpc", "kglpc:taps=0", "pcaanim", "rt"),
+)  # codecs of docs/reproduction.md
 SCALES = ("mcgv", "mcgv-affine", "pca", "laplacian", "pdct")  # files of scale/
 COSTS = {"encode_cpu_s": "encode", "decode_cpu_s": "decode"}
 CAPTURE = 20_000, 10 * 3600 * 30  # vertices, and frames: ten hours at 30 frames a second
@@ -231,6 +241,34 @@ def cluster() -> list[str]:
     return table(("run", "seconds", "processor time, s", "same bytes"), rows)
 
 
+def reproduced(paper: str) -> list[str]:
+    """The claims of a paper, and what was measured."""
+    return reproduction_table(load("reproduction/reproduction")["papers"][paper]).splitlines()
+
+
+def reproduced_states() -> list[str]:
+    """How many claims of each paper hold."""
+    rows = []
+    for paper, claims in load("reproduction/reproduction")["papers"].items():
+        states = [claim["state"] for claim in claims]
+        rows.append((f"`{paper}`", str(len(states)), *(str(states.count(state)) for state in (HOLDS, FAILS, NOT_RUN))))
+    return table(("paper", "claims", HOLDS, FAILS, NOT_RUN), rows)
+
+
+def baselines() -> list[str]:
+    """Bytes, rates and errors of all codecs at one quality."""
+    rows = []
+    for curve in BenchReport.read(DOCS / "benchmarks" / "reproduction" / "curves.json").curves:
+        if curve.codec in SYSTEMS:
+            point = min(curve.points, key=lambda one: abs(one["quality"] - 75))
+            if point["quality"] != 75:
+                continue
+            cells = (f"{point['bytes']}", f"{point['bpvf']:.3f}", f"{point['kg']:.3f}", number(point["sted"], ".4f"))
+            rows.append((curve.sequence, curve.codec, *cells))
+    rows.sort(key=lambda row: (row[0], float(row[3])))
+    return table(("sequence", "codec", "bytes", "bpvf", "KG", "STED"), [(row[0], f"`{row[1]}`", *row[2:]) for row in rows])
+
+
 def name_of(codec: str) -> str:
     """A codec's name in tables."""
     return NAMES.get(codec, f"`{codec}`")
@@ -245,6 +283,12 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "rates-at-bound": rates_at_bound,
     "differences-kg": lambda: differences("kg"),
     "differences-sted": lambda: differences("sted"),
+    "reproduction-states": reproduced_states,
+    "reproduction-mcgv": lambda: reproduced("mcgv"),
+    "reproduction-pca": lambda: reproduced("pca"),
+    "reproduction-laplacian": lambda: reproduced("laplacian"),
+    "reproduction-pdct": lambda: reproduced("pdct"),
+    "reproduction-systems": baselines,
     "scale-growth": growth,
     "scale-memory": memory,
     "scale-points": lambda: scale_table(scale_report().scale).splitlines(),

@@ -169,7 +169,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
     "gvpipe.fields.prediction_kernels.predict_rows": [
         (
             "gvpipe.fields.prediction_kernels.FieldCoding",
-            [CAUSAL, SCALAR, FLAGS, SCALAR, "float64", NUMBERS, ROWS, ROWS, "float64[3]"],
+            [CAUSAL, SCALAR, FLAGS, SCALAR, "float64", ROWS, NUMBERS, ROWS, ROWS, "float64[3]"],
         ),
         SCALAR,
         SCALAR,

@@ -79,6 +79,11 @@ def run(
             if progress:
                 progress(f"{name_of(source)} {codec}", len(curves) / (len(sources) * len(codecs)))
             curves.append(_in_own_process(source, codec, list(qualities), texts))
+    return report_of(curves)
+
+
+def report_of(curves: list[Curve]) -> BenchReport:
+    """Curves that this process measured, with its version, machine and command line."""
     return BenchReport(gvpipe.__version__, describe_machine(), ["gvpipe", *sys.argv[1:]], curves)
 
 
@@ -90,7 +95,7 @@ def measure_curve(source: str, codec: str, qualities: list[float], texts: dict[s
     with temporary_folder() as folder:
         warm = Path(folder) / "warm.mp4"
         api.encode(sequence.part(0, min(WARM_FRAMES, sequence.n_frames)), warm, settings[0])
-        api.decode(warm)
+        api.decode(warm, unlimited=True)
         paths = [Path(folder) / f"{i}.mp4" for i in range(len(settings))]
         for chosen, path in zip(settings, paths, strict=True):
             points.append(_time(sequence, chosen, path))
@@ -150,7 +155,7 @@ def _measuring(data: bytes) -> Work:
 def _time(sequence: gvpipe.MeshSequence, codec: Any, path: Path) -> dict[str, Any]:
     made = api.encode(sequence, path, codec)
     started = time.perf_counter()
-    api.decode(path)
+    api.decode(path, unlimited=True)  # it was just written here
     seconds = time.perf_counter() - started
     return {
         "quality": codec.quality,
@@ -165,8 +170,8 @@ def _time(sequence: gvpipe.MeshSequence, codec: Any, path: Path) -> dict[str, An
 
 def _verify(sequence: gvpipe.MeshSequence, path: Path) -> dict[str, Any]:
     """Measures of the decoded file, and the milliseconds of a frame at random; raises `GvpipeError` if reading disagrees."""
-    decoded = api.decode(path)
-    video = api.open(path)
+    decoded = api.decode(path, unlimited=True)
+    video = api.open(path, unlimited=True)
     picked = np.random.default_rng(0).integers(0, sequence.n_frames, FRAMES_AT_RANDOM).tolist()
     seconds = []
     for frame in picked:

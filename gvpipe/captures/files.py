@@ -22,7 +22,7 @@ def write(
     With a ``skin`` of it (`gvpipe.skin`, `Player.skin`), a ``.glb`` has its skeleton in place of morph targets. Frames are
     then as the skeleton moves them. With ``compress="meshopt"`` a ``.glb`` is compressed (EXT_meshopt_compression): positions
     that a skeleton moves have 16 bits where that will do, normals 8, keys what their error allows; vertices and triangles come
-    in another order.
+    in another order. ``"draco"`` compresses meshes alone (KHR_draco_mesh_compression), which morph targets and keys are not.
 
     A `Capture` becomes one file where the format can hold changing triangles (USD, Alembic, glTF, VTKHDF, a .pvd), numbered
     frames where the path is a pattern, and else a file for each shot: ``NAME-000.npz``.

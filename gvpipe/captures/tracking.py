@@ -6,19 +6,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-import numpy as np
-
-from gvpipe.asset.attribute import Attribute
-from gvpipe.following import Run, follow, places_on
+from gvpipe.captures.painting import left_of_looks, paint_names, picture_size, with_looks
+from gvpipe.captures.sampled_fields import sampled_fields
+from gvpipe.following import Run, follow
 from gvpipe.following.follow import MAX_ERROR, RMS
 from gvpipe.foundation.arrays import Array, Float64, Int32
 from gvpipe.foundation.notes import count
 from gvpipe.foundation.progress import Progress
+from gvpipe.io.normals.own import are_smooth
 from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 LONG = 8  # frames of a shot that is kept as it is
-COLOUR = "color"
 SHARE = 0.6  # of a largest distance that is asked for: what following may use, and coding the rest
 RMS_SHARE = 0.3  # of the same: the greatest rms
 CODED_RMSE = 0.0005  # of vertices, part of the diagonal; most of it lies along the surface
@@ -59,16 +58,22 @@ def coding_targets(targets: Targets, is_followed: bool) -> Targets:
 
 
 def is_tracked_by_default(capture: Capture) -> bool:
-    """Whether most frames have a connectivity of their own, and nothing but a colour would be lost by following."""
+    """Whether most frames have a connectivity of their own, and following loses nothing of them.
+
+    Fields would be sampled, which is not what who measures expects.
+    """
     alone = sum(length == 1 for length in capture.lengths)
-    return len(capture) > 2 and 2 * alone > len(capture) and not what_is_lost(capture.shots[0])
+    return len(capture) > 2 and 2 * alone > len(capture) and not what_is_lost(capture.shots[0]) and not capture.shots[0].fields
 
 
 def what_is_lost(shot: MeshSequence) -> list[str]:
     """What following leaves behind of a shot, by name."""
-    lost = [name for name in shot.attributes if name != COLOUR] + list(shot.fields)
-    lost += [f"{len(shot.parts)} parts"] if len(shot.parts) > 1 else []
-    lost += ["materials"] if shot.images else []
+    kept, normals = paint_names(shot), shot.attributes.get("normal")
+    if normals is not None and are_smooth(normals, shot.read(0, 1)[0], shot.faces):
+        kept.add("normal")  # those of the followed surface are as good
+    lost = [name for name in shot.attributes if name not in kept]
+    lost += [f"{len(shot.parts)} parts"] if len({part.name for part in shot.parts}) > 1 else []
+    lost += left_of_looks(shot)
     lost += ["the volume"] if shot.volume is not None else []
     return lost
 
@@ -91,7 +96,7 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
     shots: list[MeshSequence] = []
     keys: list[int | None] = []
     progress("follow", 0.0)
-    worst_rms, worst, followed, has_colours = 0.0, 0.0, 0, False
+    worst_rms, worst, followed, size = 0.0, 0.0, 0, (0, 0)
     for is_long, span in _stretches(capture):
         if is_long:
             shots += [capture.shots[number] for number in span]
@@ -102,7 +107,7 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
         for run in follow(frames, max_error=bound, rms=rms, vertices=vertices, progress=progress):
             keys.append(None if run.key is None else start + run.key)
             shots.append(capture.frame(start + run.start) if run.key is None else _shot(capture, start, run, frames.origin))
-            has_colours = has_colours or (run.key is not None and COLOUR in shots[-1].attributes)
+            size = max(size, picture_size(shots[-1]) if run.key is not None else size)
             if run.key is not None:
                 followed += run.stop - run.start
                 worst_rms = max(worst_rms, *(error.rms for error in run.errors))
@@ -116,8 +121,10 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
             f"{count(followed, 'frame')} follow {count(runs, 'key mesh', 'key meshes')}: {distance}; "
             f"{alone} are as they came (--track off: all)"
         )
-        notes += ["colours are those of the key meshes, all through their shots"] if has_colours else []
+        notes += [f"colours of each frame become textures that move, of up to {size[0]}x{size[1]} texels"] if size[0] else []
         lost = what_is_lost(capture.shots[0])
+        kept = [shot.fields for shot, key in zip(shots, keys, strict=True) if key is not None]
+        lost += [name for name in capture.shots[0].fields if not all(name in fields for fields in kept)]
         notes += [f"{SURFACE_ALONE}; left out: {', '.join(lost)}"] if lost else []
     found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
     return Tracked(found, tuple(keys), tuple(notes))
@@ -146,25 +153,13 @@ def _stretches(capture: Capture) -> Iterator[tuple[bool, list[int]]]:
 
 
 def _shot(capture: Capture, start: int, run: Run, origin: Float64) -> MeshSequence:
-    """A run of ``capture`` whose first frame is ``start + run.start``, with the colours of its key frame."""
-    assert run.key is not None
-    key = capture.frame(start + run.key)
+    """A run of ``capture`` whose first frame is ``start + run.start``, with the looks and fields of its frames."""
     first = capture.frame(start + run.start)
-    attributes = {}
-    if COLOUR in key.attributes and key.attributes[COLOUR].domain == "vertex":
-        given = key.attributes[COLOUR]
-        own = np.asarray(run.positions[run.key - run.start : run.key - run.start + 1])[0]
-        places = places_on(own, run.faces, key.read_absolute(0, 1)[0] - origin, key.faces)
-        attributes[COLOUR] = _sampled(given, places.of_vertices(np.asarray(given), key.faces))
     metadata = first.metadata
     if metadata.times:
         times = tuple(float(capture.frame(start + k).times[0]) for k in range(run.start, run.stop))
         metadata = replace(metadata, times=times)
-    return MeshSequence(run.positions, run.faces, capture.fps, attributes, capture.name, origin, metadata=metadata)
-
-
-def _sampled(given: Attribute, values: Array) -> Attribute:
-    """An attribute with other values, in its own type."""
-    kind = given.values.dtype
-    rounded = np.rint(values) if kind.kind in "iu" else values
-    return Attribute(rounded.astype(kind), given.domain)
+    frames = capture.part(start + run.start, start + run.stop)
+    fields = sampled_fields(frames, origin, run)
+    bare = MeshSequence(run.positions, run.faces, capture.fps, {}, capture.name, origin, fields=fields, metadata=metadata)
+    return with_looks(bare, frames, run)

@@ -28,12 +28,14 @@ from gvpipe.cli.encode_options import encode_options, parse_encoding, parse_sett
 from gvpipe.cli.page_options import page_options
 from gvpipe.cli.pipes import PIPE, STDIN, STDOUT, VIDEO_SUFFIXES, is_video, shown, source_path, target_path
 from gvpipe.cli.process import Ended, collect_seldom, ending_by_exception, replace_closed_streams
+from gvpipe.cli.reproduction import fetch_data, reproduce
 from gvpipe.foundation.atomic import remove_abandoned_folders
 from gvpipe.foundation.errors import GvpipeError, InputError, TopologyChange
 from gvpipe.foundation.text import escaped
 
 if TYPE_CHECKING:
     from gvpipe.encoding.report import Report
+    from gvpipe.metrics.frame_metrics import FrameMetric
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
@@ -483,6 +485,7 @@ def _source_info(source: str, path: str, reading: dict[str, Any], out: Output) -
 @click.option("--frames", metavar="A:B", help="Only frames A to B - 1, of DISTORTED too unless it holds just as many.")
 @click.option("--fps", type=float, help="Frames per second at which REFERENCE is sampled.")
 @click.option("--surface", is_flag=True, help="The distance of the surfaces, too. [default: where vertices do not correspond]")
+@click.option("--metrics", metavar="NAME,...", default="", help="More metrics: psnr, dame, fmpd, mesh, d1, d2.")
 @unlimited_option
 @output_options
 def compare(
@@ -494,6 +497,7 @@ def compare(
     frames: str | None,
     fps: float | None,
     surface: bool,
+    metrics: str,
     unlimited: bool,
     out: Output,
 ) -> None:
@@ -502,9 +506,10 @@ def compare(
     Where their vertices do not correspond, surfaces are compared: the distance of each from the other.
     """
     from gvpipe.cli.choices import parse_frames
-    from gvpipe.metrics import comparison
+    from gvpipe.metrics import comparison, frame_metrics
     from gvpipe.playback import files
 
+    more = frame_metrics.check_metrics(metrics) if metrics else ()
     if reference == distorted == PIPE:
         raise click.UsageError("both are -, and there is one standard input", click.get_current_context())
     span = parse_frames(frames)
@@ -524,12 +529,12 @@ def compare(
                 read_other = partial(read_other, volume=True)
                 given = given if given.volume is not None else read_given(volume=True)
                 compared = read_other() if span is None else _same_frames(read_other, span, len(given))
-            result = comparison.compare(given, compared, show_progress, surface=surface or None)
+            result = comparison.compare(given, compared, show_progress, surface=surface or None, metrics=more)
         except TopologyChange:
             capture = files.read_capture(one, fps, clip, its_mesh, span, unlimited=unlimited)
             whole = files.read_capture(other, None, other_clip, other_mesh, unlimited=unlimited)
             part = whole if span is None or len(whole) == len(capture) else whole.part(*span)
-            result = comparison.compare_captures(capture, part, show_progress)
+            result = comparison.compare_captures(capture, part, show_progress, metrics=more)
     values = result.to_json()
     out.json(values)
     if result.unpaired:
@@ -538,11 +543,21 @@ def compare(
         _print_numbers(out, {name: value for name, value in values.items() if name != "surface"})
     if result.surface is not None:
         _print_numbers(out, result.surface.to_json(), "surface ")
+    for name, metric in result.metrics.items():
+        out.text(f"{name:<14} {_metric_text(metric)}")
     for kind, errors in (("attribute", result.attributes), ("field", result.fields), ("inside", result.volume)):
         for name, error in errors.items():
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+
+
+def _metric_text(metric: FrameMetric) -> str:
+    """A metric's mean over frames, and the range of these."""
+    known = [each for each in metric.frames if each is not None]
+    if metric.value is None or not known:
+        return "not defined"
+    return f"{metric.value:.6g} (frames: {min(known):.6g} to {max(known):.6g})"
 
 
 def _print_numbers(out: Output, values: dict[str, Any], prefix: str = "") -> None:
@@ -574,6 +589,8 @@ def _same_frames(read: Callable[..., MeshSequence], span: tuple[int, int | None]
 cli.add_command(convert)
 cli.add_command(encode_all)
 cli.add_command(bench)
+cli.add_command(reproduce)
+cli.add_command(fetch_data)
 cli.add_command(plot)
 cli.add_command(codecs)
 cli.add_command(new_codec)

@@ -163,6 +163,7 @@ class Codec(Protocol):
     seconds_per_vertex: ClassVar[float]
     has_levels: ClassVar[bool]
     codes_live: ClassVar[bool]
+    competes: ClassVar[bool]
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     @property
@@ -198,6 +199,13 @@ class Codec(Protocol):
         """Return the skeleton that moves a bitstream's vertices, as far as it goes; None: it has none; raises `CorruptFile`."""
         ...
 
+    def find_skin(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Skin | None:
+        """Return joints and weights that would leave about the error of its quality; nothing is coded. None: it has none.
+
+        Arguments are those of `encode`. Joints rest: their transforms are for others to fit, from the first frame as bind pose.
+        """
+        ...
+
     @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """Return what each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""
@@ -224,6 +232,7 @@ class BaseCodec:
         seconds_per_vertex: that its reader asks for (`gvpipe.foundation.budget`), at least.
         has_levels: its files have levels of detail.
         codes_live: it codes frames as they come (`start_live`).
+        competes: ``--codec auto`` takes it into account, where it is installed.
     """
 
     id: ClassVar[str]
@@ -236,6 +245,7 @@ class BaseCodec:
     seconds_per_vertex: ClassVar[float] = 12e-6
     has_levels: ClassVar[bool] = False
     codes_live: ClassVar[bool] = False
+    competes: ClassVar[bool] = True
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -260,6 +270,10 @@ class BaseCodec:
     @classmethod
     def skin(cls, bitstream: Bitstream) -> Skin | None:
         """The skeleton of its files; see `Codec.skin`. Here: none."""
+        return None
+
+    def find_skin(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Skin | None:
+        """Joints and weights for a sequence; see `Codec.find_skin`. Here: none."""
         return None
 
     @classmethod

@@ -84,6 +84,8 @@ def pack_row(
         own = {name: len(data) for name, data in shot.sections.items() if left_out.get(name) not in shared}
         sections.update(own)
         sections["video"] += bytes_by_part(shot, 0).get("video", 0)
+        for companion in shot.companions:
+            sections[companion.kind] += companion.n_bytes
         shared |= {digest: shot.sections[name] for name, digest in left_out.items()}
         bare = replace(shot, is_bare=True)
         data = file_bytes(shot, parts[number]) if number in parts else file_bytes(bare, shared=left_out)

@@ -10,7 +10,8 @@ frame, in the one before and in the one after. With S the neighbours' average un
 - the neighbours one by one.
 
 Two filters learn the weights from the row's own values, by the recursion of recursive least squares with a prior (a Kalman
-filter of constant weights). The first one learns fast, the second one slowly. Their guesses are averaged, each weighed by the
+filter of constant weights). The first one learns fast, the second one slowly: by how
+much is one of `TUNINGS`. Their guesses are averaged, each weighed by the
 inverse square of its recent squared errors. The weights of the first five signals, and the errors, start from what the nearest
 neighbours came to.
 
@@ -48,9 +49,18 @@ class Kind:
 
 
 STEPS, WHOLE = Kind(), Kind(whole=True)
+# Constants of both filters: prior variance of a shared weight; of a neighbour's, in that of the causal order; variance of what
+# weights do not explain, as a share of the residuals' and in steps squared; share of a residual's square in their variance.
+# The second set suits smooth fields inside of volumes, such as a temperature.
+TUNINGS = (
+    ((0.15, 1.5, 0.25, 0.05, 0.2), (0.05, 0.3, 1.0, 0.3, 0.05)),
+    ((0.15, 0.03, 0.12, 0.1, 0.9), (0.05, 0.01, 1.35, 0.05, 0.12)),
+)
 
 
-def predict_values(target: Float64, n_frames: int, causal: CausalOrder, still: Bool, kind: Kind = STEPS) -> Int64:
+def predict_values(
+    target: Float64, n_frames: int, causal: CausalOrder, still: Bool, kind: Kind = STEPS, tuning: int = 0
+) -> Int64:
     """Return the residuals ``(R, N)`` of ``target (R, N)``, N = C F columns.
 
     Args:
@@ -59,25 +69,30 @@ def predict_values(target: Float64, n_frames: int, causal: CausalOrder, still: B
         causal: the order of the R rows.
         still: ``(R,)`` rows that keep each component's first value.
         kind: of the residuals.
+        tuning: which of `TUNINGS` the filters have.
     """
     residuals, decoded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
-    _run(residuals, decoded, target, (n_frames, causal, still, kind))
+    _run(residuals, decoded, target, (n_frames, causal, still, kind, tuning))
     return residuals
 
 
-def restore_values(residuals: Int64, n_frames: int, causal: CausalOrder, still: Bool, kind: Kind = STEPS) -> Float64:
+def restore_values(
+    residuals: Int64, n_frames: int, causal: CausalOrder, still: Bool, kind: Kind = STEPS, tuning: int = 0
+) -> Float64:
     """Mirror of `predict_values`: values ``(R, N)``; NaN where a residual leads to no float32."""
     decoded = np.zeros(residuals.shape)
-    _run(residuals, decoded, np.zeros((0, 0)), (n_frames, causal, still, kind))
+    _run(residuals, decoded, np.zeros((0, 0)), (n_frames, causal, still, kind, tuning))
     return decoded
 
 
-def _run(residuals: Int64, decoded: Float64, target: Float64, shared: tuple[int, CausalOrder, Bool, Kind]) -> None:
+def _run(residuals: Int64, decoded: Float64, target: Float64, shared: tuple[int, CausalOrder, Bool, Kind, int]) -> None:
     from gvpipe.fields import prediction_kernels as kernels
 
-    n_frames, causal, still, kind = shared
+    n_frames, causal, still, kind, tuning = shared
     number = kernels.FLOATS if kind.unit else kernels.WHOLE if kind.whole else kernels.STEPS
     target, n_rows = np.ascontiguousarray(target), len(causal.order)
     learnt = np.zeros((n_rows, kernels.N_FILTERS, kernels.N_SHARED + 2))
-    coding = kernels.FieldCoding(causal, n_frames, still, number, kind.unit, residuals, decoded, target, learnt)
+    coding = kernels.FieldCoding(
+        causal, n_frames, still, number, kind.unit, np.array(TUNINGS[tuning]), residuals, decoded, target, learnt
+    )
     kernels.predict_rows(coding, 0, n_rows)

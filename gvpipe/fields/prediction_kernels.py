@@ -18,11 +18,7 @@ LARGEST_FLOAT = float(np.finfo(np.float32).max)
 FARTHEST = 2.0**37  # magnitude of a prediction, steps
 DOUBT = 0.01  # part of a weight's variance that a value leaves at least, so that rounding cannot grow
 N_FILTERS = 2
-SHARED_VARIANCE = (0.15, 0.05)  # of each filter: prior variance of a shared weight
-NEAR_VARIANCE = (1.5, 0.3)  # prior variance of a neighbour's weight, in that of the causal order
-NOISE = (0.25, 1.0)  # variance of a value that the weights do not explain: share of the residuals' variance,
-FLOOR = (0.05, 0.3)  # and steps squared
-MEMORY = (0.2, 0.05)  # share of a residual's square in their variance
+SHARED, NEAR, NOISE, FLOOR, MEMORY = range(5)  # constants of a filter, in columns of a tuning
 TRUST = 0.35  # share of an error's square in the running mean that weighs the filters
 TRUST_FLOOR = 0.02  # added to that mean, steps squared
 
@@ -36,6 +32,7 @@ class FieldCoding(NamedTuple):
         still: ``(R,)`` rows that keep each component's first value.
         kind: `STEPS`, `WHOLE` or `FLOATS`.
         unit: of `FLOATS`: values are multiples of it; a power of two.
+        tuning: ``(N_FILTERS, 5)`` one of `gvpipe.fields.prediction.TUNINGS`.
         residuals: ``(R, N)``, N = C F columns.
         decoded: ``(R, N)``.
         target: ``(R, N)`` what to code; ``(0, 0)``: decode.
@@ -47,6 +44,7 @@ class FieldCoding(NamedTuple):
     still: Bool
     kind: int
     unit: float
+    tuning: Float64
     residuals: Int64
     decoded: Float64
     target: Float64
@@ -102,7 +100,7 @@ def predict_rows(coding: FieldCoding, first_rank: int, end_rank: int) -> None:
         for j in range(first, first + n_near):
             for n in range(n_columns):
                 base[n] += causal.weights[j] * coding.decoded[causal.neighbours[j], n]
-        _start(state, i, n_near, causal, learnt)
+        _start(state, i, n_near, coding)
         for n in range(n_columns):
             if coding.still[row] and n % coding.n_frames:
                 coding.decoded[row, n] = coding.decoded[row, n - 1]
@@ -110,7 +108,7 @@ def predict_rows(coding: FieldCoding, first_rank: int, end_rank: int) -> None:
             _gather(state, coding, i, n, n_near, base)
             guess = _guess(state, N_SHARED + n_near)
             change = _code(coding, row, n, base[n] + guess)
-            _learn(state, N_SHARED + n_near, coding.decoded[row, n] - base[n], change)
+            _learn(state, coding.tuning, N_SHARED + n_near, coding.decoded[row, n] - base[n], change)
         for f in range(N_FILTERS):
             for s in range(N_SHARED):
                 learnt[row, f, s] = state.weights[f, s]
@@ -119,8 +117,9 @@ def predict_rows(coding: FieldCoding, first_rank: int, end_rank: int) -> None:
 
 
 @compiled
-def _start(state: Filter, i: int, n_near: int, causal: CausalOrder, learnt: Float64) -> None:
+def _start(state: Filter, i: int, n_near: int, coding: FieldCoding) -> None:
     """Set the filters' priors for rank i: shared weights and variances from its nearest neighbours'."""
+    causal, learnt, tuning = coding.causal, coding.learnt, coding.tuning
     first, n = causal.starts[i], N_SHARED + n_near
     ring = abs(causal.ring_sizes[i])
     ring = min(ring if ring else n_near, n_near)
@@ -143,9 +142,9 @@ def _start(state: Filter, i: int, n_near: int, causal: CausalOrder, learnt: Floa
         if not ring:
             weights[0] = 1.0
         for s in range(N_SHARED):
-            covariance[s, s] = SHARED_VARIANCE[f]
+            covariance[s, s] = tuning[f, SHARED]
         for j in range(n_near):
-            own = NEAR_VARIANCE[f] * causal.variances[first + j]
+            own = tuning[f, NEAR] * causal.variances[first + j]
             for b in range(n_near):  # the neighbours' weights keep their sum
                 covariance[N_SHARED + j, N_SHARED + b] = -own * causal.variances[first + b] / total
             covariance[N_SHARED + j, N_SHARED + j] += own
@@ -227,13 +226,13 @@ def _float(number: int) -> float:
 
 
 @compiled
-def _learn(state: Filter, n: int, value: float, change: float) -> None:
+def _learn(state: Filter, tuning: Float64, n: int, value: float, change: float) -> None:
     """Update the filters by a value, less its base, and by the residual that it took."""
     signals, direction = state.signals, state.direction
     for f in range(N_FILTERS):
         weights, covariance = state.weights[f], state.covariance[f]
         error = value - state.guesses[f]
-        variance = state.noises[f] * NOISE[f] + FLOOR[f]
+        variance = state.noises[f] * tuning[f, NOISE] + tuning[f, FLOOR]
         for a in range(n):
             direction[a] = 0.0
         for b in range(n):  # each sum over b in order; side by side for all a
@@ -248,5 +247,5 @@ def _learn(state: Filter, n: int, value: float, change: float) -> None:
             own = covariance[a]
             for b in range(n):
                 own[b] -= gain * direction[b]
-        state.noises[f] += MEMORY[f] * (change * change - state.noises[f])
+        state.noises[f] += tuning[f, MEMORY] * (change * change - state.noises[f])
         state.errors[f] += TRUST * (error * error - state.errors[f])

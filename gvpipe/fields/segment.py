@@ -17,6 +17,7 @@ mode           rest
 1 prediction   residuals in steps (`gvpipe.fields.prediction`)
 2 trajectories `gvpipe.fields.trajectories`
 3 derived      a derivation (`gvpipe.fields.derived`), then residuals in steps of what does not follow, as in mode 1
+4 tuned        [8 bits] which constants the filters have (`gvpipe.fields.prediction`), then residuals in steps
 =============  ==========================================================================================
 
 Blocks and rest hold the D distinct frames and the components that are not constant.
@@ -35,7 +36,7 @@ from gvpipe.container.segments import LARGEST_STEP
 from gvpipe.entropy.integers import decode_integers
 from gvpipe.fields.derived import Derivation, Span
 from gvpipe.fields.holes import decode_holes
-from gvpipe.fields.prediction import STEPS, WHOLE, Kind, restore_values
+from gvpipe.fields.prediction import STEPS, TUNINGS, WHOLE, Kind, restore_values
 from gvpipe.fields.residual_coding import decode_residuals
 from gvpipe.fields.trajectories import decode_trajectories
 from gvpipe.fields.values import from_numbers
@@ -44,8 +45,8 @@ from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import InputError, corrupt_section
 from gvpipe.trajectory.causal_order import CausalOrder
 
-EXACT, PREDICTION, TRAJECTORIES, DERIVED = range(4)
-MODES = ("exact", "prediction", "trajectories", "derived")
+EXACT, PREDICTION, TRAJECTORIES, DERIVED, TUNED = range(5)
+MODES = ("exact", "prediction", "trajectories", "derived", "tuned")
 STEP = struct.Struct("<d")
 BYTES_PER_VALUE, SECONDS_PER_VALUE = 40, 0.4e-6
 BYTES_PER_FLAG, SECONDS_PER_FLAG = 24, 0.2e-6
@@ -175,9 +176,12 @@ def _decode_numbers(cursor: Cursor, mode: int, is_whole: bool, n_components: int
             raise InputError(f"{place.name!r} follows from the mesh's positions; give its reader the positions")
         derivation = Derivation.take(cursor, n_components, place.span.motion.n_frames)
         base = derivation.values(place.span)[np.flatnonzero(np.diff(of_frames, prepend=-1))]
+    tuning = cursor.take(1)[0] if mode == TUNED else 0
+    if tuning >= len(TUNINGS):
+        raise cursor.corrupt(f"its filters have constants of number {tuning}")
     residuals = decode_residuals(cursor.rest(), n_components * n_frames, n_frames, causal, cursor.name, still)
     kind = STEPS if mode != EXACT else WHOLE if is_whole else Kind(unit=step)
-    own: Float64 = by_frame(restore_values(residuals, n_frames, causal, still, kind), n_frames) * step
+    own: Float64 = by_frame(restore_values(residuals, n_frames, causal, still, kind, tuning), n_frames) * step
     return own if base is None else base + own
 
 

@@ -18,6 +18,9 @@ from gvpipe.foundation.errors import InputError, TopologyChange, printable
 
 AGAIN, FRAME_AGAIN = "export it again", "export this frame again"
 WHOLE = "it may be cut short, so export it again"
+OTHERWISE = "export it in another form or format"
+NOT_READ = re.compile(r"\b(not|are) (read|followed)\b")
+REMEDY = re.compile(r"\b(needed|check|convert|export|get|give|install|must|put|remove|save|set|use|write)\b")
 LONGEST = 300  # characters of a reason
 LISTED = 12  # names in a message
 
@@ -61,7 +64,10 @@ def check_file(path: Path) -> None:
 
 def unreadable(path: Path, kind: str, reason: str, at: str = "", remedy: str = AGAIN) -> InputError:
     """The error of a file that cannot be read; arguments as of `reading`. A reason that ends in a remedy keeps its own."""
-    again = "" if "; " in reason else f"; {remedy}"
+    about = reason.rpartition("; ")[2] if "; " in reason else ""
+    if remedy == AGAIN and NOT_READ.search(reason):  # another export of the same kind would be refused, too
+        remedy = OTHERWISE
+    again = "" if REMEDY.search(about) else f"; {remedy}"
     return InputError(f"{path}{f': {at}' if at else ''} cannot be read{f' as {kind}' if kind else ''}: {reason}{again}")
 
 

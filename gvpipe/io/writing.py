@@ -25,7 +25,7 @@ HOLD_VOLUMES = (".vtu", ".pvd", ".vtkhdf", ".xdmf")
 HOLD_MOVING = (".obj", "", *USD)
 HOLD_PICTURES = (".npz", ".glb", ".gltf", ".ply", ".openvat")
 STILL = "{} has no textures that move: each shows the picture of its first frame; --texture-out writes them as a video"
-COMPRESSIONS = ("none", "meshopt")
+COMPRESSIONS = ("none", "meshopt", "draco")
 
 
 def is_glb(path: str) -> bool:
@@ -63,7 +63,8 @@ def write(
             (``out/%04d.obj``) or a folder (existing, or ending in ``/``).
         start: number of the first frame file.
         skin: of the sequence, for a ``.glb`` or USD: its skeleton is written in place of morph targets or sampled points.
-        compress: ``"meshopt"``: a ``.glb`` in fewer bytes, by EXT_meshopt_compression; or ``"none"``.
+        compress: of a ``.glb``: ``"meshopt"``, in fewer bytes by EXT_meshopt_compression; ``"draco"``, its meshes by
+            KHR_draco_mesh_compression; or ``"none"``.
 
     Raises:
         InputError: the path names no format that can be written, or none that has a skeleton or a compression.
@@ -74,12 +75,12 @@ def write(
     check_target(path)
     suffix = Path(path).suffix.lower()
     if compress not in COMPRESSIONS:
-        raise SettingError(f"compress is {show(compress)}; {' or '.join(map(repr, COMPRESSIONS))} is needed")
+        raise SettingError(f"compress is {show(compress)}; 'none', 'meshopt' or 'draco' is needed")
     if sequence.sound is not None:
         left = "the sound is left out, for which mesh files have no place; gvpipe decode writes it beside them"
         return (*write(sequence.with_sound(None), path, start, skin, compress), left)
-    is_packed = compress != "none"
-    if is_packed and not is_glb(path):
+    is_compressed = compress != "none"
+    if is_compressed and not is_glb(path):
         raise InputError(f"{path}: a compressed file is one .glb; give such a name, or leave the compression out")
     if suffix not in HOLD_MOVING and any(image.is_moving for image in sequence.images):
         still = sequence.with_looks(sequence.materials, tuple(image.frame(0) for image in sequence.images))
@@ -93,9 +94,9 @@ def write(
             if len(skin.clips) > 1:
                 raise InputError(f"{path}: USD has one animation; write a file for each clip, or a .glb")
             return tuple(USD_SKIN_WRITER(sequence, Path(path), skin))
-        return tuple(SKIN_WRITER(sequence, skin, Path(path), is_packed))
-    if is_packed:
-        return tuple(GLB_WRITER(sequence, Path(path), is_packed))
+        return tuple(SKIN_WRITER(sequence, skin, Path(path), compress))
+    if is_compressed:
+        return tuple(GLB_WRITER(sequence, Path(path), compress))
     if suffix == ".vtu":
         return tuple(VTU_WRITER(sequence, Path(path), start))
     if sequence.volume is not None and suffix not in HOLD_VOLUMES:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import os
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -24,10 +24,17 @@ from gvpipe.foundation.arrays import Integers
 from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.topology import unique_edges
 from gvpipe.metrics.asset_errors import AssetErrors, compare_attributes, compare_fields, compare_volumes
+from gvpipe.metrics.frame_metrics import FrameMetric, FrameMetrics, check_metrics, need_surfaces, unpaired_metrics
 from gvpipe.metrics.hausdorff import Hausdorff
 from gvpipe.metrics.pairing import Unpaired, pair_vertices
 from gvpipe.metrics.sted import Sted
-from gvpipe.metrics.surface_comparison import CaptureSurfaces, SequenceSurfaces, SurfaceComparison, compare_surfaces
+from gvpipe.metrics.surface_comparison import (
+    CaptureSurfaces,
+    SequenceSurfaces,
+    SurfaceComparison,
+    Surfaces,
+    compare_surfaces,
+)
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
 from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
@@ -47,7 +54,7 @@ class Comparison:
 
     ``surface`` has the distances of surfaces, where they were asked for or vertices do not correspond. ``unpaired`` says why
     vertices do not, else it is empty. If they do not, ``rmse`` and ``max`` are NaN, other numbers of vertices ``None``,
-    ``frames`` is empty, and attributes, fields and volumes are not compared.
+    ``frames`` is empty, and attributes, fields and volumes are not compared. ``metrics`` has those that were asked for.
     """
 
     rmse: float
@@ -66,6 +73,7 @@ class Comparison:
     volume: AssetErrors = field(default_factory=dict)
     surface: SurfaceComparison | None = None
     unpaired: str = ""
+    metrics: dict[str, FrameMetric] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
@@ -110,6 +118,7 @@ def compare(
     progress: FramesDone | None = None,
     *,
     surface: bool | None = None,
+    metrics: str | Iterable[str] = (),
 ) -> Comparison:
     """Measure ``distorted`` against ``reference``, frame by frame: vertices, surfaces where these do not correspond.
 
@@ -118,10 +127,11 @@ def compare(
         distorted: as many frames; of the same vertices and triangles, in any order, or of others.
         progress: called with (frames done, frames in all) after each block.
         surface: True: surfaces too; False: never; None: where vertices do not correspond.
+        metrics: more of them, by name (`gvpipe.metrics.frame_metrics`). Those of surfaces have them compared.
 
     Raises:
-        InputError: they differ in their number of frames, vertices do not correspond and ``surface`` is False, or surfaces are
-            needed and one side has no triangles.
+        InputError: they differ in their number of frames, vertices do not correspond and ``surface`` is False, surfaces are
+            needed and one side has no triangles, or no metric has such a name.
         TypeError: one of them is no sequence.
 
     Examples:
@@ -136,30 +146,34 @@ def compare(
     for role, given in (("reference", reference), ("distorted", distorted)):
         if not isinstance(given, MeshSequence):
             raise TypeError(f"compare's {role} is {show(given)}; a MeshSequence is needed, such as gvpipe.read(path)")
+    names = check_metrics(metrics)
+    surface = True if need_surfaces(names) else surface
     has_surfaces = bool(len(reference.faces) and len(distorted.faces))
     try:
         pairing = pair_vertices(reference, distorted)
     except Unpaired as exc:
         if surface is False or not has_surfaces:
             raise
-        return replace(NOTHING, surface=_surfaces(reference, distorted, progress), unpaired=str(exc))
+        return _compare_unpaired(SequenceSurfaces(reference), SequenceSurfaces(distorted), progress, names, str(exc))
     if not surface:
-        return _compare_vertices(reference, distorted, pairing, progress)
+        return _compare_vertices(reference, distorted, pairing, progress, names)
     if not has_surfaces:
         raise InputError(f"{reference.name} has no triangles, so that there are no surfaces to compare; compare vertices alone")
-    errors = _compare_vertices(reference, distorted, pairing, _half(progress, 0))
-    return replace(errors, surface=_surfaces(reference, distorted, _half(progress, 1)))
+    found = compare_surfaces(SequenceSurfaces(reference), SequenceSurfaces(distorted), _half(progress, 0))
+    return _compare_vertices(reference, distorted, pairing, _half(progress, 1), names, found)
 
 
-def compare_captures(reference: Capture, distorted: Capture, progress: FramesDone | None = None) -> Comparison:
-    """Measure two animations whose vertices or triangles change, by their surfaces.
+def compare_captures(
+    reference: Capture, distorted: Capture, progress: FramesDone | None = None, *, metrics: str | Iterable[str] = ()
+) -> Comparison:
+    """Measure two animations whose vertices or triangles change, by their surfaces; ``metrics`` as `compare` takes them.
 
     Raises:
-        InputError: they differ in their number of frames, or one side of a frame has no triangles.
+        InputError: they differ in their number of frames, one side of a frame has no triangles, or no metric has such a name.
     """
-    surface = compare_surfaces(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress)
-    changing = reference if len(reference.shots) > 1 else distorted
-    return replace(NOTHING, surface=surface, unpaired=f"vertices or triangles of {changing.name} change")
+    names, changing = check_metrics(metrics), reference if len(reference.shots) > 1 else distorted
+    why = f"vertices or triangles of {changing.name} change"
+    return _compare_unpaired(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress, names, why)
 
 
 def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
@@ -167,12 +181,21 @@ def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
     return None if progress is None else lambda done, of: progress(done + half * of, 2 * of)
 
 
-def _surfaces(reference: MeshSequence, distorted: MeshSequence, progress: FramesDone | None) -> SurfaceComparison:
-    return compare_surfaces(SequenceSurfaces(reference), SequenceSurfaces(distorted), progress)
+def _compare_unpaired(
+    reference: Surfaces, distorted: Surfaces, progress: FramesDone | None, names: tuple[str, ...], why: str
+) -> Comparison:
+    surface = compare_surfaces(reference, distorted, progress)
+    metrics = unpaired_metrics(names, reference, distorted, surface)
+    return replace(NOTHING, surface=surface, unpaired=why, metrics=metrics)
 
 
 def _compare_vertices(
-    reference: MeshSequence, distorted: MeshSequence, pairing: Integers | None, progress: FramesDone | None
+    reference: MeshSequence,
+    distorted: MeshSequence,
+    pairing: Integers | None,
+    progress: FramesDone | None,
+    names: tuple[str, ...],
+    surface: SurfaceComparison | None = None,
 ) -> Comparison:
     given = distorted
     distorted = distorted if pairing is None else distorted.reordered(np.argsort(pairing), reference.faces)
@@ -181,7 +204,7 @@ def _compare_vertices(
     diagonal = frame_diagonal(reference)
     sted = Sted(edges, reference.n_vertices, diagonal)
     hausdorff = Hausdorff(reference.faces, edges, reference.n_vertices)
-    errors = VertexErrors()
+    errors, more = VertexErrors(), FrameMetrics(names, reference.faces, reference.n_vertices)
     step = max(1, BLOCK_BYTES // (24 * reference.n_vertices))
     apart = distorted.origin - reference.origin
     for first, chunk in reference.exact_chunks():
@@ -192,6 +215,7 @@ def _compare_vertices(
             errors.add(a, distance)
             sted.add(a, b)
             hausdorff.add(a, b, distance)
+            more.add(a, b)
             if progress is not None:
                 progress(first + start + len(a), n_frames)
     found = errors.result(diagonal)
@@ -208,4 +232,6 @@ def _compare_vertices(
         attributes=compare_attributes(reference, given, same),
         fields=compare_fields(reference, given, same),
         volume=compare_volumes(reference, given),
+        surface=surface,
+        metrics=more.result(errors.rmse, diagonal, surface),
     )

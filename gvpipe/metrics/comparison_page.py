@@ -17,6 +17,14 @@ SHOWN = {
     "sted": "STED error",
     "hausdorff": "Hausdorff distance, model units",
 }
+OF_METRICS = {
+    "psnr": "signal-to-noise ratio of vertices, dB",
+    "dame": "dihedral angle mesh error, radians",
+    "fmpd": "fast mesh perceptual distance",
+    "mesh": "root mean square distance over the area, model units",
+    "d1": "D1, dB",
+    "d2": "D2, dB",
+}
 OF_SURFACES = {
     "rms_diag": "root mean square distance of the surfaces, % of the diagonal",
     "p99_diag": "99 % of distances are below, % of the diagonal",
@@ -34,6 +42,9 @@ def comparison_html(numbers: Mapping[str, Any]) -> str:
     surface = numbers.get("surface")
     if surface:
         rows += [(words, f"{100 * surface[name]:.4g}") for name, words in OF_SURFACES.items() if surface[name] is not None]
+    for name, metric in numbers["metrics"].items():
+        if metric["value"] is not None:
+            rows.append((OF_METRICS[name], f"{metric['value']:.4g}"))
     for kind in ("attributes", "fields", "volume"):
         for name, errors in numbers[kind].items():
             rows.append((f"{name}: largest error", f"{errors['max']:.4g}" if errors.get("max") is not None else "none"))

@@ -30,9 +30,10 @@ QUANTILE = 0.99
 class SurfaceErrors:
     """Distances between two surfaces, of both ways the larger; None: no meaning, or not measured.
 
-    Model units: ``rms``, the root mean square, ``p99``, the 99 % quantile, and ``max``, the largest, at samples and vertices.
-    The same as parts of a diagonal: ``_diag``. Squared model units: ``d1_mse``, from point to point, and ``d2_mse``, from point
-    to plane. Of these the peak signal-to-noise ratio in decibels, at most 99.99: ``d1_psnr``, ``d2_psnr``.
+    Model units: ``rms``, the root mean square, ``p99``, the 99 % quantile, and ``max``, the largest, at samples and vertices;
+    ``mesh_rms``, the root mean square over the area. The same as parts of a diagonal: ``_diag``. Squared model units:
+    ``d1_mse``, from point to point, and ``d2_mse``, from point to plane. Of these the peak signal-to-noise ratio in decibels,
+    at most 99.99: ``d1_psnr``, ``d2_psnr``.
     """
 
     rms: float
@@ -45,6 +46,8 @@ class SurfaceErrors:
     d1_psnr: float | None
     d2_mse: float | None
     d2_psnr: float | None
+    mesh_rms: float
+    mesh_rms_diag: float | None
 
     def to_json(self) -> dict[str, Any]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
@@ -138,7 +141,7 @@ def measure(
     clouds = make_clouds(one.corners, other.corners, scale.low, scale.peak, grid) if grid else None
     with beside(lambda: _one_way(one, other, samples, seed, clouds)) as there:
         back = _one_way(other, one, samples, seed, clouds and clouds[::-1])
-        rms, p99, largest, *d1_d2 = np.maximum(there(), back).tolist()
+        rms, p99, largest, mesh_rms, *d1_d2 = np.maximum(there(), back).tolist()
     d1, d2 = (None if math.isnan(each) else each for each in d1_d2)
     return SurfaceErrors(
         rms,
@@ -151,6 +154,8 @@ def measure(
         psnr(d1, scale.peak),
         d2,
         psnr(d2, scale.peak),
+        mesh_rms,
+        ratio(mesh_rms, scale.diagonal),
     )
 
 
@@ -162,12 +167,13 @@ def scale_of(points: Float64) -> Scale:
 
 
 def _one_way(source: Surface, target: Surface, samples: int, seed: int, clouds: tuple[Cloud, Cloud] | None) -> Float64:
-    """Root mean square, quantile and largest distance at samples and vertices, D1 and D2 ``(5,)``; NaN: not measured."""
-    points = np.concatenate([sample_by_area(source.corners, samples, seed).points, source.used])
-    distances = find_nearest(target.tree, points).distances
-    rms = math.sqrt(float(np.square(distances).mean()))
+    """``rms``, ``p99``, ``max``, ``mesh_rms``, ``d1_mse`` and ``d2_mse`` ``(6,)`` of one way; NaN: not measured."""
+    by_area = sample_by_area(source.corners, samples, seed).points
+    distances = find_nearest(target.tree, np.concatenate([by_area, source.used])).distances
+    squared = np.square(distances)
+    rms, mesh_rms = (math.sqrt(float(part.mean())) for part in (squared, squared[: len(by_area)]))
     d1, d2 = cloud_errors(*clouds, target.tree) if clouds else (math.nan, math.nan)
-    return np.array([rms, np.quantile(distances, QUANTILE), distances.max(), d1, d2])
+    return np.array([rms, np.quantile(distances, QUANTILE), distances.max(), mesh_rms, d1, d2])
 
 
 def _as_points(given: Any, name: str) -> Float64:

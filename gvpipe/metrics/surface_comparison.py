@@ -20,8 +20,8 @@ from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
 
 FramesDone = Callable[[int, int], None]
-OF_FRAMES = ("rms", "p99", "max", "d1_psnr", "d2_psnr")
-NO_ERROR = SurfaceErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, BEST_PSNR, 0.0, BEST_PSNR)
+OF_FRAMES = ("rms", "p99", "max", "mesh_rms", "d1_psnr", "d2_psnr")
+NO_ERROR = SurfaceErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, BEST_PSNR, 0.0, BEST_PSNR, 0.0, 0.0)
 
 
 class Surfaces(Protocol):
@@ -81,7 +81,7 @@ class SurfaceComparison(SurfaceErrors):
         peak: the longest side of the box of all frames of the reference, model units.
         samples: of each surface and frame, beside its vertices.
         grid: lines along the longest side, for D1 and D2.
-        frames: of each frame ``rms``, ``p99``, ``max``, ``d1_psnr`` and ``d2_psnr``.
+        frames: of each frame ``rms``, ``p99``, ``max``, ``mesh_rms``, ``d1_psnr`` and ``d2_psnr``.
     """
 
     diagonal: float

@@ -6,6 +6,7 @@ capture only knows which shot a frame lies in.
 
 from __future__ import annotations
 
+import operator
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate
@@ -132,6 +133,22 @@ class Capture:
         """The same shots at another rate; raises `InputError`: it is not above 0 and up to 100000."""
         shots = LazyShots(len(self.shots), lambda number: self.shots[number].with_fps(fps))
         return Capture(shots, self.name, self.lengths, fps, self.sound)
+
+
+def one_frame(source: Any, frame: int) -> MeshSequence:
+    """One frame of a sequence, a capture or a player of either, as a sequence of one.
+
+    Raises:
+        IndexError: there is no such frame.
+    """
+    if hasattr(source, "frame"):  # a capture, or its player
+        made: MeshSequence = source.frame(frame)
+        return made
+    sequence: MeshSequence = source.sequence() if hasattr(source, "sequence") else source
+    index = operator.index(frame)
+    if not -len(sequence) <= index < len(sequence):
+        raise IndexError(f"frame {index} of {sequence.name}: there are {len(sequence)}")
+    return sequence.part(index % len(sequence), index % len(sequence) + 1)
 
 
 def some_frames(capture: Capture, frames: tuple[int, int | None] | None, fps: float | None) -> Capture:

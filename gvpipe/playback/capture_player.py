@@ -17,6 +17,7 @@ from gvpipe.container.sources import is_remote
 from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32
 from gvpipe.foundation.errors import corrupt, in_file
+from gvpipe.io.simulation.vtk_frames import to_pyvista
 from gvpipe.media.sound import Sound
 from gvpipe.model.capture import Capture, LazyShots
 from gvpipe.model.sequence import MeshSequence
@@ -118,6 +119,10 @@ class CapturePlayer:
     def frame(self, frame: int) -> MeshSequence:
         """A frame with all that belongs to it, as a sequence of one; raises IndexError."""
         return self.capture().frame(frame)
+
+    def to_pyvista(self, frame: int = 0) -> Any:
+        """A frame as a data set of PyVista, which must be installed; raises as `gvpipe.to_pyvista` does."""
+        return to_pyvista(self, frame)
 
     def __len__(self) -> int:
         return len(self._row)

@@ -31,6 +31,7 @@ from gvpipe.foundation.arguments import check_path
 from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError, in_file
 from gvpipe.grids.volume import Volume
+from gvpipe.io.simulation.vtk_frames import to_pyvista
 from gvpipe.media.sound import Sound
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
@@ -251,6 +252,10 @@ class Player:
             sound=self.sound,
         )
 
+    def to_pyvista(self, frame: int = 0) -> Any:
+        """A frame as a data set of PyVista, which must be installed; raises as `gvpipe.to_pyvista` does."""
+        return to_pyvista(self, frame)
+
     def __len__(self) -> int:
         return self.bitstream.n_frames
 
@@ -264,6 +269,8 @@ class Player:
             if step != 1:
                 frames = [self[i] for i in range(start, stop, step)]
                 return np.stack(frames) if frames else self._shared.read(0, 0)
+            if stop == start + 1:  # sequences that show frame after frame ask like this
+                return self._cache.frame(start)[None]
             return self._shared.read(start, max(start, stop))
         index = operator.index(key)
         if not -len(self) <= index < len(self):

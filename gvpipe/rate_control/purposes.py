@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 from gvpipe.coding.codec import Codec
-from gvpipe.coding.registry import codec_ids
+from gvpipe.coding.registry import codec_class, codec_ids
 from gvpipe.foundation.arguments import did_you_mean
 from gvpipe.foundation.errors import SettingError
 
@@ -87,7 +87,7 @@ def check_serves(codec: Codec, purpose: str | None) -> None:
 def _competitors(purpose: str | None) -> list[tuple[str, Own]]:
     """Ids with settings of their own."""
     if purpose is None or purpose == ARCHIVE:
-        return [(name, own) for name in codec_ids() for own in VARIANTS.get(name, ({},))]
+        return [(name, own) for name in codec_ids() if codec_class(name).competes for own in VARIANTS.get(name, ({},))]
     return list(SERVES[purpose].items())
 
 

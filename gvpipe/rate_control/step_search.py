@@ -28,6 +28,7 @@ FLAT_SLOPE = 0.2  # below it, errors hardly follow steps
 FINE_ENOUGH = 0.85  # part of the target error, from which on an error may stay where a larger one saves too little
 HOPELESS = 2  # encodes in turn whose rest is above the target: steps that round everything to 0 look so once
 PROPORTIONAL = 2.0  # times, an error beside a measured one for which the step in proportion is believed
+COARSEST = 1000.0  # spreads of a sequence, a step that rounds everything to 0 (`Goal.coarsest`)
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
 
@@ -104,6 +105,10 @@ class Goal:
             error that no step leaves ends the search.
         cost: of an encode, its error counted. Where errors hardly follow steps, steps grow only as long as that falls, if the
             error is near already. None: until the error is close enough.
+        most: part of the target error above which an encode is of no use, if another is below.
+        coarsest: a step that rounds everything to 0, model units; None: unknown. Errors scatter near it. So it is tried where
+            coarser steps leave too small an error, and kept if its own is small enough. Qualities that ask for more than 0
+            leaves have one file.
     """
 
     target_error: float
@@ -112,6 +117,8 @@ class Goal:
     rounds: int = ROUNDS
     levels_off: bool = False
     cost: Callable[[StepTrial], float] | None = None
+    most: float = math.inf
+    coarsest: float | None = None
 
     @property
     def middle(self) -> float:
@@ -121,6 +128,10 @@ class Goal:
     def is_close(self, error: float) -> bool:
         """Whether an error, model units, ends the search."""
         return self.close_enough[0] <= error / self.target_error <= self.close_enough[1]
+
+    def is_small_enough(self, error: float) -> bool:
+        """Whether an error, model units, is not above those that end the search."""
+        return error <= self.close_enough[1] * self.target_error
 
 
 class StepSearch:
@@ -154,11 +165,14 @@ class StepSearch:
     def is_done(self) -> bool:
         """Whether no further encode pays."""
         is_enough = len(self._measured) >= self.goal.rounds or self.goal.is_close(self._measured[-1][1])
+        is_enough = (is_enough and not self._is_saturated(last=True)) or self._is_coarsest()
         return is_enough or self._n_hopeless == HOPELESS or self._is_dearer()
 
     def next_step(self) -> float:
         """The step to try next, model units."""
         step, error = self._measured[-1]
+        if self.goal.coarsest and self._is_saturated(last=len(self._measured) >= self.goal.rounds):
+            return self.goal.coarsest
         if self._flat and self._flat.rest < self.goal.middle:
             return min(max(self._flat.step(self.goal.middle), step / MOST_CHANGE), step * MOST_CHANGE)
         return step * _change(error, self.goal.middle, self.slope)
@@ -167,7 +181,26 @@ class StepSearch:
         """The step whose error is nearest to the goal, and that error."""
         if self._is_dearer():
             return self._measured[-2]
-        return min(reversed(self._measured), key=lambda one: abs(math.log(one[1]) - math.log(self.goal.middle)))
+        measured = self._measured
+        if self._is_coarsest():
+            if self.goal.is_small_enough(measured[-1][1]):
+                return measured[-1]
+            measured = measured[:-1]
+        useful = [one for one in measured if one[1] <= self.goal.most * self.goal.target_error] or measured
+        return min(reversed(useful), key=lambda one: abs(math.log(one[1]) - math.log(self.goal.middle)))
+
+    def _is_coarsest(self) -> bool:
+        """Whether the last step rounded everything to 0."""
+        return self._measured[-1][0] == self.goal.coarsest
+
+    def _is_saturated(self, last: bool) -> bool:
+        """Whether a coarser step left too small an error: one that hardly rose, or, after the ``last`` round, any."""
+        if self.goal.coarsest is None or len(self._measured) < 2 or self._is_coarsest():
+            return False
+        (step, error), (other, other_error) = self._measured[-2:]
+        if not other > step or other_error >= self.goal.close_enough[0] * self.goal.target_error:
+            return False
+        return last or math.log(other_error / error) < FLAT_SLOPE * math.log(other / step)
 
     def _is_dearer(self) -> bool:
         """Whether a larger step cost more, where errors hardly follow steps and the one before was fine enough."""

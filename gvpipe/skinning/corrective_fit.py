@@ -23,6 +23,7 @@ from gvpipe.model.skin import Skin
 
 MEMORY = 1 << 29  # bytes of what the joints leave; longer sequences are looked at in some of their frames
 DAMPING = 1e-2  # of the identity: blends that flatten a vertex take nothing back
+FIRST = 16  # shapes that are looked at, before as many as are allowed: sixty-four take sixteen times as long
 SMALL = 0.1  # of the root mean square that is left at last: what a shape adds to a vertex, at most, and is left out
 TINY = 1e-6  # of the longest change that a shape makes: the same
 RIDGE = 1e-9  # of a shape's energy
@@ -43,7 +44,11 @@ def correct(skin: Skin, sequence: MeshSequence, most: int, part: float, is_enoug
     shapes = _principal_shapes(skin, sequence, most, unit)
     if not len(shapes):
         return None
-    equations = _equations(skin, sequence, shapes, unit)
+    equations = _equations(skin, sequence, shapes[:FIRST], unit)
+    if len(shapes) > FIRST and equations.left(FIRST) > part:
+        equations = _equations(skin, sequence, shapes, unit)
+    else:
+        shapes = shapes[:FIRST]
     tried: dict[int, tuple[Skin, bool]] = {}
 
     def made(count: int) -> tuple[Skin, bool]:
@@ -100,8 +105,8 @@ def _principal_shapes(skin: Skin, sequence: MeshSequence, most: int, unit: float
     for row, k in enumerate(chosen):
         off = (sequence.read(k, k + 1)[0].astype(np.float64) - skin.evaluate(k)) / unit
         blends = skin.blended(k)[:, :, :3]
-        turned = np.swapaxes(blends, 1, 2)
-        left[row] = np.linalg.solve(turned @ blends + damping, turned @ off[:, :, None]).reshape(-1)
+        normal = np.einsum("vji,vjk->vik", blends, blends) + damping
+        left[row] = _solve(normal, np.einsum("vji,vj->vi", blends, off)).reshape(-1)
     energies, vectors = np.linalg.eigh((left @ left.T).astype(np.float64))
     energies, vectors = energies[::-1], vectors[:, ::-1]
     count = min(most, int((energies > 1e-12 * max(energies[0], 0)).sum())) if energies[0] > 0 else 0
@@ -114,15 +119,26 @@ def _principal_shapes(skin: Skin, sequence: MeshSequence, most: int, unit: float
     return made
 
 
+def _solve(matrices: Float64, right: Float64) -> Float64:
+    """``(n, 3)`` that solve ``matrices (n, 3, 3)`` by Cramer's rule: libraries take longer for many small ones."""
+    one, two, three = np.moveaxis(matrices, 1, 0)
+    inverse = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=2)  # times the determinant
+    return np.asarray(np.einsum("vij,vj->vi", inverse, right) / (one * inverse[:, :, 0]).sum(axis=1)[:, None])
+
+
 def _equations(skin: Skin, sequence: MeshSequence, shapes: Float32, unit: float) -> _Equations:
     count, energy = len(shapes), 0.0
     normal, given = np.empty((sequence.n_frames, count, count)), np.empty((sequence.n_frames, count))
-    by_vertex = np.ascontiguousarray(np.moveaxis(shapes, 0, 2))  # (V, 3, K)
+    by_axis = np.ascontiguousarray(np.moveaxis(shapes, 0, 2).swapaxes(0, 1))  # (3, V, K)
+    posed = np.empty((by_axis.shape[1], 3, count), np.float32)
     for first, block in sequence.chunks():
         for k, frame in enumerate(block, first):
-            posed = (skin.blended(k)[:, :, :3].astype(np.float32) @ by_vertex).reshape(-1, count)
+            blends = skin.blended(k).astype(np.float32)[..., None]  # (V, 3, 4, 1)
+            for axis in range(3):  # products of so small matrices take five times as long
+                posed[:, axis] = sum(blends[:, axis, other] * by_axis[other] for other in range(3))
+            rows = posed.reshape(-1, count)
             off = ((frame.astype(np.float64) - skin.evaluate(k)) / unit).reshape(-1)
-            normal[k], given[k] = posed.T @ posed, posed.T @ off
+            normal[k], given[k] = rows.T @ rows, rows.T @ off
             energy += float(np.square(off).sum())
     return _Equations(normal, given, energy)
 

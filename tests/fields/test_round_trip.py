@@ -17,7 +17,7 @@ from gvpipe.fields.segment import MODES as ALL_MODES
 from gvpipe.fields.values import FieldBound, to_integers
 from gvpipe.foundation.errors import InputError
 
-MODES = ALL_MODES[:3]  # without positions
+MODES = [mode for mode in ALL_MODES if mode != "derived"]  # without positions
 FIELDS = sorted((DATA / "fields").glob("*.npz"))
 
 

@@ -111,6 +111,7 @@ def test_every_kind_of_field_is_python_s(longest: int, tmp_path: Path, monkeypat
     bound, rng = FieldBound(0.02), np.random.default_rng(5)
     add_made(job, "scalar", wave(N_FRAMES), bound, "prediction")
     add_made(job, "cells", wave(N_FRAMES, 3, triangles), bound, "trajectories", "triangle", kind="vector")
+    add_made(job, "tuned", wave(N_FRAMES), bound, "tuned")
     add_made(job, "exact", wave(N_FRAMES, 2), EXACT, "exact")
     add_made(job, "fine", wave(N_FRAMES, 2), FieldBound(2e-4), "trajectories")
     holes = wave(N_FRAMES, 2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -109,3 +111,29 @@ def test_steps_between_anchors() -> None:
     assert step_between(anchors, 0.06) == pytest.approx(0.06)
     assert step_between(anchors, 3.0) is None
     assert step_between([], 1.0) is None
+
+
+def _leveling(step: float) -> StepTrial:
+    """Errors as they are near the step from which on all is rounded to 0, which leaves 0.8."""
+    return StepTrial(EMPTY, step, 0.8 if step > 50 else min(0.9 * step, 0.85))
+
+
+@pytest.mark.parametrize("target", [1.0, 1.5, 4.0, 100.0])
+def test_where_zero_is_good_enough_all_targets_have_one_step(target: float) -> None:
+    assert find_step(_leveling, target, Goal(target, coarsest=1e6)).step == 1e6
+
+
+def test_zero_is_not_taken_where_it_leaves_too_much() -> None:
+    assert find_step(_leveling, 0.5, Goal(0.5, coarsest=1e6)).error == pytest.approx(0.45)
+    assert find_step(lambda step: StepTrial(EMPTY, step, 0.3 if step < 9 else 2.0), 1.0, Goal(1.0, coarsest=1e6)).error == 0.3
+
+
+def test_an_error_of_no_use_is_not_the_nearest() -> None:
+    """Of 0.7 and 1.05, the second is nearer to 0.95; where it is refused, the first is found."""
+
+    def attempt(step: float) -> StepTrial:
+        return StepTrial(EMPTY, step, 0.7 if step < 1.5 else 1.05)
+
+    goal = Goal(1.0, (0.94, 0.96))
+    assert find_step(attempt, 1.0, goal).error == 1.05
+    assert find_step(attempt, 1.0, dataclasses.replace(goal, most=1.0)).error == 0.7

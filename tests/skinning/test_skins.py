@@ -14,6 +14,7 @@ import pytest
 import trimesh
 from asset_scene import scene
 from folders import GOLDEN, ROOT
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from sequences import rigid, waving, wrinkled
 
@@ -253,8 +254,8 @@ def test_compression_of_what_moves_not_and_of_other_files(tmp_path: Path, run: A
     assert gvpipe.read(tmp_path / "still.glb").n_frames == 1 and "animations" not in _tree(tmp_path / "still.glb")
     with pytest.raises(InputError, match="one .glb"):
         gvpipe.write(scene(), tmp_path / "a.usdc", compress="meshopt")
-    with pytest.raises(SettingError, match="'none' or 'meshopt'"):
-        gvpipe.write(scene(), tmp_path / "a.glb", compress="draco")
+    with pytest.raises(SettingError, match="'none', 'meshopt' or 'draco'"):
+        gvpipe.write(scene(), tmp_path / "a.glb", compress="zip")
     ended = run("decode", RIGID, tmp_path / "b.npz", "--compress", "meshopt")
     assert ended.status == 2 and "--compress is for a .glb" in ended.err
     assert run("decode", RIGID, tmp_path / "b.glb", "--compress", "meshopt").status == 0
@@ -328,6 +329,59 @@ def test_engines_show_corrective_shapes(compress: str, engine: str, tmp_path: Pa
     shown = [0, 1, 11, 23]
     found = shown_by(engine, tmp_path / "a.glb", [k / sequence.fps for k in shown])
     assert farthest(found, skin.read(0, 24)[shown][:, sources]) < max(2e-5, 0.1 * skin.error)
+
+
+@each_engine
+@pytest.mark.parametrize("correctives", [0, 8])
+def test_draco_files_show_the_same(correctives: int, engine: str, tmp_path: Path) -> None:
+    """In Draco's order of vertices; where shapes need it, in the order that they have."""
+    sequence = wrinkled()
+    skin = gvpipe.skin(sequence, joints=2, target_kg=0.2, correctives=correctives)
+    assert gvpipe.write(sequence, tmp_path / "plain.glb", skin=skin) == []
+    notes = gvpipe.write(sequence, tmp_path / "small.glb", skin=skin, compress="draco")
+    assert ["not morph targets" in note for note in notes] == ([True] if correctives else [])
+    assert (tmp_path / "small.glb").stat().st_size < (0.8 if correctives else 0.5) * (tmp_path / "plain.glb").stat().st_size
+    frames, own = gvpipe.read(tmp_path / "small.glb").read(0, 24), skin.read(0, 24)
+    rows = cKDTree(own[5]).query(frames[5])[1]
+    assert np.array_equal(np.sort(rows), np.arange(len(rows))) and np.array_equal(rows, np.sort(rows)) == bool(correctives)
+    assert farthest(frames, own[:, rows]) < max(2e-5, 0.1 * skin.error)
+    shown = [0, 1, 11, 23]
+    assert farthest(shown_by(engine, tmp_path / "small.glb", [k / sequence.fps for k in shown]), frames[shown]) < 2e-5
+
+
+def test_draco_holds_what_lies_beside_positions(tmp_path: Path) -> None:
+    sequence = scene()
+    skin = gvpipe.skin(sequence)
+    for compress in ("none", "draco"):
+        gvpipe.write(sequence, tmp_path / f"{compress}.glb", skin=skin, compress=compress)
+    assert "KHR_draco_mesh_compression" in _tree(tmp_path / "draco.glb")["extensionsRequired"]
+    plain, small = (gvpipe.read(tmp_path / f"{compress}.glb") for compress in ("none", "draco"))
+    assert [part.name for part in small.parts] == [part.name for part in plain.parts]
+    assert len(small.faces) == len(plain.faces) and set(small.attributes) == set(plain.attributes) > {"uv", "color", "normal"}
+    corners = [corner_rows(each) for each in (plain, small)]
+    assert max(cKDTree(one).query(other)[0].max() for one, other in (corners, corners[::-1])) < 0.02  # normals have 10 bits
+
+
+def test_what_draco_does_not_hold_stays_as_it_is(tmp_path: Path) -> None:
+    """Triangles that are lines, and sheets that are a point."""
+    sheet = waving(4, 5)
+    lines = replace(sheet, faces=np.repeat(sheet.faces[:, :1], 3, axis=1))
+    point = replace(sheet, positions=np.zeros_like(sheet.positions))
+    for sequence, skin in ((lines, gvpipe.skin(sheet, joints=2)), (point, None)):
+        notes = gvpipe.write(sequence, tmp_path / "a.glb", skin=skin, compress="draco")
+        assert any("none is compressed" in note for note in notes)
+        assert "extensionsUsed" not in _tree(tmp_path / "a.glb") and gvpipe.read(tmp_path / "a.glb").n_frames == 5
+
+
+def corner_rows(sequence: MeshSequence) -> Any:
+    """``(3 T, n)``: position in the first frame, uv, normal and colour of each corner."""
+    corners = sequence.faces.reshape(-1)
+    rows = [sequence.read(0, 1)[0][corners]]
+    for name in ("uv", "normal", "color"):
+        one = sequence.attributes[name]
+        values = np.asarray(one) if one.domain == "corner" else np.asarray(one)[corners]
+        rows.append(values / (255.0 if values.dtype == np.uint8 else 1.0))
+    return np.concatenate(rows, axis=1)
 
 
 def test_shapes_where_the_largest_error_counts() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from folders import ROOT
-from pages import LOAD, TEXT, points
+from pages import CLICK, LOAD, TEXT, points
 from shots import SHOT, Shot, hue
 
 import gvpipe
@@ -112,6 +112,36 @@ def test_sections_have_the_fields_colours(player: Player, site: Site, block: Mes
     for t in np.argsort(-sizes)[:25]:
         colour = 255 * table[round(255 * float(np.clip((values[t] - low) / (high - low), 0, 1)))]
         assert hue(seen(*corners[t].mean(axis=0))) == pytest.approx(hue(colour), abs=0.06), (t, values[t])
+
+
+@pytest.mark.parametrize("field", ["temperature", "energy"])
+def test_the_probe_reads_the_section(player: Player, site: Site, block: MeshSequence, field: str) -> None:
+    """A click on it gives the value of a point of the grid near it, or of the cell."""
+    opened(player, block, site, field=field, camera="0,0")
+    place = float(np.mean([block[0][:, 2].min(), block[0][:, 2].max()]))
+    player(f"{CUT} await shown('clip', args[0]); await element.seek(3);", f"z={place}")
+    corners, _, cells = wanted(block, 3, 2, place)
+    volume, kind = block.volume, "triangle" if field == "energy" else "vertex"
+    assert volume is not None
+    inside = volume.cell_fields[field] if kind == "triangle" else volume.point_fields[field]
+    values = inside.read(3, 4)[0, :, 0]
+    if kind == "vertex":
+        values = np.concatenate([block.fields[field].read(3, 4)[0, :, 0], values])
+    sizes = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    seen = set()
+    for t in np.argsort(-sizes)[:40:4]:
+        middle = corners[t].mean(axis=0)
+        told = player(f"{CLICK} return [await click(args[0]), box.innerText];", middle.tolist())
+        point = told[0]["point"]
+        assert told[0]["cell"] == cells[t] and told[0]["triangle"] is None
+        assert told[0]["value"] == values[cells[t] if kind == "triangle" else point]
+        nodes = volume.cells.nodes[volume.cells.offsets[cells[t]] : volume.cells.offsets[cells[t] + 1]]
+        assert point in nodes
+        is_inside = point >= block.n_vertices
+        assert told[0]["vertex"] == (None if is_inside else point)
+        assert (f"point {point} inside" if is_inside else f"vertex {point}") in told[1] and f"cell {cells[t]}" in told[1]
+        seen.add(is_inside)
+    assert True in seen
 
 
 def test_the_panel_and_the_handle_move_the_cut(player: Player, site: Site, block: MeshSequence) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import io
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +13,13 @@ import browsers
 import numpy as np
 import pages
 import pytest
+from moving import colour, pictures, sheet
+from pages import TEXT
 from PIL import Image
 from sequences import waving
 
 import gvpipe
+from gvpipe.model.moving_texture import with_pictures
 from gvpipe.model.sequence import MeshSequence
 
 SIDES = [(8, 6), (6, 5), (10, 4), (5, 1)]  # vertices a side, frames
@@ -71,6 +76,45 @@ def player(driver: Any, site: tuple[Path, str]) -> Run:
     driver.get(f"{site[1]}/player.html")
     find = "const element = document.querySelector('geometry-video');"
     return lambda body, *arguments: pages.run(driver, find + body, *arguments)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pca", "mcgv"])
+def test_textures_move_over_shots(player: Run, site: tuple[Path, str], kind: str) -> None:
+    """Each frame shows its own picture, in whichever shot it is, after jumps and while it plays."""
+    made = []
+    for start, stop in ((0, 6), (6, 10)):
+        flat = with_pictures(sheet(stop - start), pictures(stop, (63, 48))[start:], "skin")
+        made.append(flat.with_looks(tuple(replace(each, unlit=True) for each in flat.materials), flat.images).with_fps(12.0))
+    gvpipe.encode(gvpipe.Capture(made, "two"), site[0] / f"textures-{kind}.mp4", kind, **(H264 if kind == "mcgv" else {}))
+    order = [0, 7, 3, 9, 5, 6, 1]
+    jumps, played = player(
+        f"""{TEXT} {pages.LOAD}
+        const jumps = [], played = [];
+        const still = async () => text(new Uint8Array(await (await element.still()).arrayBuffer()));
+        for (const k of args[1]) {{
+          await element.seek(k);
+          jumps.push([element.currentFrame, element.shot, await still()]);
+        }}
+        [element.playbackRate, element.loop] = [0.1, true];
+        await element.play();
+        const end = performance.now() + 20000;
+        while (new Set(played.map(([, shot]) => shot)).size < 2 && performance.now() < end) {{
+          const k = element.currentFrame;
+          const picture = await still();
+          if (k === element.currentFrame) played.push([k, element.shot, picture]);
+          await new Promise((resolve) => setTimeout(resolve, 20));
+        }}
+        element.pause();
+        return [jumps, played];""",
+        f"textures-{kind}.mp4",
+        order,
+    )
+    assert [k for k, _, _ in jumps] == order and {shot for _, shot, _ in played} == {0, 1}
+    for k, shot, data in (*jumps, *played):
+        pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"), int)
+        height, width = pixels.shape[:2]
+        assert shot == (k >= 6) and np.abs(pixels[height // 2, width // 2] - colour(k)).max() <= 8, (k, shot)
 
 
 def placed(video: gvpipe.CapturePlayer, k: int) -> np.ndarray:

@@ -109,6 +109,23 @@ def start(driver: Any, player: Callable[..., Any], name: str) -> None:
     assert (began, playing) == ("", True), error
 
 
+def test_shots_follow_the_sound(driver: Any, player: Callable[..., Any], site: tuple[Path, str], tone: Path) -> None:
+    """One sound goes on over the shots of a capture, and frames of the second come as it says."""
+    shots = [waving(6, 30).with_fps(FPS), waving(8, 42).with_fps(FPS)]
+    gvpipe.encode(gvpipe.Capture(shots, "two"), site[0] / "capture.mp4", "pca", audio=tone)
+    start(driver, player, "capture.mp4")
+    seen = player(
+        """const seen = [];
+        element.addEventListener("frame", () => seen.push([element.currentFrame, element.shot, off()]));
+        for (const end = performance.now() + 20000; performance.now() < end && element.currentFrame < 45; ) await wait(20);
+        element.pause();
+        return seen;"""
+    )
+    assert {shot for _, shot, _ in seen} == {0, 1}
+    assert all(shot == (frame >= 30) for frame, shot, _ in seen)
+    assert abs(np.median([off for _, _, off in seen])) < 3, seen
+
+
 @pytest.mark.parametrize("layout", ["plain", "stream"])
 def test_frames_follow_the_sound(
     layout: str, driver: Any, player: Callable[..., Any], site: tuple[Path, str], tone: Path

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from asset_files import write_asset
-from pages import LOAD, run
+from pages import CLICK, LOAD, run
 from shots import SHOT, Shot, hue
 
 import gvpipe
@@ -26,28 +26,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browsers.missing()), rea
 LOADS = itertools.count()
 Player = Callable[..., Any]
 Site = tuple[Path, str]
-CLICK = """const canvas = element.shadowRoot.querySelector("canvas");
-    const { left, top, width, height } = canvas.getBoundingClientRect();
-    const m = element.projection;
-    const pointer = (type, x, y) => canvas.dispatchEvent(new PointerEvent(type, {
-      pointerId: 1, button: 0, buttons: type === "pointerup" ? 0 : 1, clientX: x, clientY: y, bubbles: true, composed: true,
-      pointerType: "mouse", isPrimary: true }));
-    const place = ([x, y, z]) => {
-      const [a, b, , d] = [0, 1, 2, 3].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);
-      return [left + (a / d * 0.5 + 0.5) * width, top + (0.5 - b / d * 0.5) * height];
-    };
-    const box = element.shadowRoot.querySelector(".probe");
-    const click = async (point, drag = 0) => {
-      const told = new Promise((resolve) => {
-        element.addEventListener("probe", ({ detail }) => resolve(detail), { once: true });
-        setTimeout(() => resolve(null), 800);
-      });
-      const [x, y] = place(point);
-      pointer("pointerdown", x, y);
-      if (drag) pointer("pointermove", x + drag, y);
-      pointer("pointerup", x + drag, y);
-      return told;
-    };"""
 
 
 def panel(heights: npt.ArrayLike = 0.0, **changes: Any) -> MeshSequence:

@@ -23,7 +23,7 @@ from gvcodecs.mcgv.settings import Settings
 from gvpipe.coding.codec import Encoded, FrameReader, Memo
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import SegmentParts
-from gvpipe.foundation.progress import Progress
+from gvpipe.foundation.progress import Progress, silent
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.model.skin import Skin
 
@@ -57,6 +57,12 @@ class Mcgv(Settings):
         from gvcodecs.mcgv.decoding.skin_reader import read_skin
 
         return read_skin(bitstream)
+
+    def find_skin(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Skin | None:
+        """The blend that an encode starts from, as joints and weights; None with affine prediction."""
+        from gvcodecs.mcgv.encoding.skeleton import find_skeleton
+
+        return find_skeleton(Job(self, sequence, memo or Memo(is_shared=False), progress or silent))
 
     @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:

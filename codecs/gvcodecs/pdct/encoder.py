@@ -35,6 +35,7 @@ from gvpipe.mesh.lattice import Lattice
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.step_search import (
+    COARSEST,
     PROPORTIONAL,
     Anchor,
     Goal,
@@ -101,7 +102,8 @@ class Pdct(BaseCodec):
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         report("base", 0)
-        target_error = error_of(self.quality) / 100 * memo("spread", lambda: measure_spread(sequence))
+        spread = memo("spread", lambda: measure_spread(sequence))
+        target_error = error_of(self.quality) / 100 * spread
         start = self._start(sequence, target_error, memo)
         anchors = memo("anchors", list[Anchor])
         found_step = step_between(anchors, target_error)
@@ -114,8 +116,10 @@ class Pdct(BaseCodec):
             report("measure", 0)
             return StepTrial(encoded, step, root_mean_square(own, self.reader(encoded.bitstream)))
 
-        trial = find_step(attempt, first_step(anchors, target_error, FIRST), Goal(target_error))
-        if trial.error > target_error / PROPORTIONAL:  # else the step hardly matters, and tells nothing of other errors
+        goal = Goal(target_error, coarsest=COARSEST * spread)
+        trial = find_step(attempt, first_step(anchors, target_error, FIRST), goal)
+        matters = trial.error > target_error / PROPORTIONAL and trial.step != goal.coarsest
+        if matters:  # else the step tells nothing of other errors
             anchors.append(Anchor(trial.step, trial.error))
         return trial.encoded
 

@@ -39,7 +39,7 @@ def read_frames(path: str | Sequence[str], options: ReadOptions) -> MeshSequence
     frames = FrameFiles(files[first_file:stop], first_file, options.memory is not None)
     first = frames.first
     columns = split_columns(frames)
-    moving = None if options.memory is not None else moving_looks(first, frames.paths, first_file)
+    moving = moving_looks(first, frames.paths, first_file)
     later = changing_looks(first, frames.paths, moving is not None)
     frames.forget_animated()
     if fps is None and len(files) > 1:

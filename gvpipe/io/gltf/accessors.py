@@ -64,6 +64,10 @@ class Accessors:
         """Whether an accessor's integers stand for fractions."""
         return flag(self.document.item("accessors", number)[0], "normalized")
 
+    def stored_type(self, number: int) -> np.dtype[np.generic]:
+        """The type of an accessor's numbers."""
+        return _dtype(*self.document.item("accessors", number)).newbyteorder("=")
+
     def count(self, number: int) -> int:
         """Elements of an accessor."""
         accessor, name = self.document.item("accessors", number)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64
+from gvpipe.io.gltf.draco_writing import draco_notes
 from gvpipe.io.gltf.glb import Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.scene_writing import prepare
@@ -21,13 +22,13 @@ from gvpipe.model.capture import Capture
 NOTE = "glTF's meshes keep their triangles: each of {} shots is a node of its own, whose scale is 0 outside of its frames"
 
 
-def write_capture(capture: Capture, path: Path, is_packed: bool = False) -> tuple[str, ...]:
+def write_capture(capture: Capture, path: Path, compress: str = "none") -> tuple[str, ...]:
     """Write a capture as one animated GLB; return what it cannot hold, a line each.
 
     Args:
         capture: to be written.
         path: of the ``.glb``.
-        is_packed: compressed by EXT_meshopt_compression.
+        compress: ``"meshopt"``, ``"draco"`` or ``"none"``.
 
     Raises:
         InputError: a shot has no triangles, or the file would be longer than a GLB can be.
@@ -37,9 +38,9 @@ def write_capture(capture: Capture, path: Path, is_packed: bool = False) -> tupl
     times = np.arange(len(capture)) / capture.fps
     channels: list[tuple[Json, Json]] = []
     nodes: list[int] = []
-    with glb_at(path, is_packed) as glb:
+    with glb_at(path, compress) as glb:
         for number, (begin, length, shot) in enumerate(zip(capture.starts, capture.lengths, capture.shots, strict=True)):
-            prepared = prepare(shot, is_packed=is_packed)
+            prepared = prepare(shot, is_packed=compress == "meshopt")
             moving = write_moving(glb, prepared)
             (scene,) = glb.tree.pop("scenes")
             size = [1, 1, 1] if not number else [0, 0, 0]  # viewers that play nothing show the first shot
@@ -48,6 +49,7 @@ def write_capture(capture: Capture, path: Path, is_packed: bool = False) -> tupl
             channels.append(_shown(glb, nodes[-1], times, (begin, begin + length)))
             said += [*prepared.notes, *animation_notes(most_targets(moving))]
         glb.append("scenes", {"nodes": nodes})
+        said += draco_notes(glb) if glb.is_draco else ()
         write_animation(glb, capture.shots[0], channels)
     return tuple(dict.fromkeys(said))
 

@@ -53,6 +53,8 @@ def decode_primitive(accessors: Accessors, draco: Json, names: Json, plain: Read
         values = values.reshape(len(values), -1)
         if values.shape[1] not in [WIDTHS[kind] for kind in kinds]:
             raise ValueError(f"{where} has {name} of {values.shape[1]} components; {' or '.join(kinds)} is needed")
+        if values.dtype.kind == "u":  # some integers come back wider than they are
+            values = values.astype(accessors.stored_type(number))
         if form != STORED and accessors.is_normalized(number):
             return as_fractions(values)
         return values.astype(np.float32) if form == FLOATS or values.dtype.kind == "f" else values

@@ -4,7 +4,8 @@ Bytes go to a stream as they come, so that a long animation needs no memory; the
 written last.
 
 A packed file has its views in meshopt's compression (`gvpipe.io.gltf.meshopt`). They lie in the file's buffer; a second one,
-which has no bytes, says where they are once decoded.
+which has no bytes, says where they are once decoded. A file of Draco has the triangles of its meshes in one
+(`gvpipe.io.gltf.draco_writing`), and all else as it is.
 """
 
 from __future__ import annotations
@@ -47,11 +48,12 @@ class Glb:
     """A file in the making. ``tree`` is its JSON, to which the caller adds meshes, nodes and what else there is.
 
     Args:
-        is_packed: whether its views are compressed.
+        compress: ``"meshopt"``: its views are compressed; ``"draco"``: its meshes are; or ``"none"``.
     """
 
-    def __init__(self, is_packed: bool = False) -> None:
-        self.is_packed = is_packed
+    def __init__(self, compress: str = "none") -> None:
+        self.is_packed = compress == "meshopt"
+        self.is_draco = compress == "draco"
         self.tree: Json = {"asset": {"version": "2.0", "generator": "gvpipe"}, "accessors": [], "bufferViews": []}
         self.images: dict[Image, tuple[int, str]] = {}  # numbers and media types of those that are there
         self._stream: IO[bytes] = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by `close`
@@ -110,6 +112,10 @@ class Glb:
             view = self.view(rows.tobytes(), target, stride)
         item = self._accessor(values, bounds) | {"bufferView": view}
         return self.append("accessors", item | ({"normalized": True} if normalized else {}))
+
+    def outside(self, values: Array, bounds: bool = False, normalized: bool = False) -> int:
+        """Add an accessor of values that an extension holds, and return its number; only their type and bounds are kept."""
+        return self.append("accessors", self._accessor(values, bounds) | ({"normalized": True} if normalized else {}))
 
     def _packed_view(self, rows: UInt8, target: int | None, stride: int | None, filtered: Filtered | None) -> int:
         """Add a view of ``rows (n, bytes)`` in compressed form, or as it is where that is smaller."""
@@ -213,14 +219,14 @@ class Glb:
 
 
 @contextmanager
-def glb_at(path: Path, is_packed: bool = False) -> Iterator[Glb]:
+def glb_at(path: Path, compress: str = "none") -> Iterator[Glb]:
     """A file in the making, which is at the path once the block ends without an error.
 
     Raises:
         InputError: it would be longer than a GLB can be.
         OutputError: the file cannot be written.
     """
-    glb = Glb(is_packed)
+    glb = Glb(compress)
     try:
         yield glb
         with unnamed_path(path) as temporary, open(temporary, "wb") as file:

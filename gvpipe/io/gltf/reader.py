@@ -13,7 +13,7 @@ import numpy as np
 
 from gvpipe.asset.attribute import guess_kind
 from gvpipe.foundation.arrays import Array, Float32, Float64, Floats
-from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.errors import InputError, TopologyChange
 from gvpipe.foundation.notes import DEFAULT_FPS
 from gvpipe.io.damage import reading
 from gvpipe.io.gltf.accessors import Accessors
@@ -193,15 +193,17 @@ def _sequence(path: Path, opened: OpenScene, options: ReadOptions, names: list[s
 def _chosen(path: Path, opened: OpenScene, options: ReadOptions, rate: float) -> tuple[Scene, Float64, int | None]:
     """The scene, the times of its frames, and the frame before which those end, where other meshes take their turn."""
     times = options.keep("times", lambda: times_of(opened.clip, rate))
-    if options.memory is None:
-        return opened.all(), times, None
     first, stop = options.span(len(times), str(path))
     nodes = [each.node for each in opened.shown]
     turns = options.keep("turns", lambda: find_turns(opened.nodes, opened.clip, nodes, times))
     if turns is None:
-        return options.keep("whole", opened.all), times[first:stop], None
+        return options.keep("whole", opened.all), times if options.memory is None else times[first:stop], None
     end = turns.run(first, stop)
     own = [number for number, group in enumerate(turns.groups) if group == turns.shown[first]]
+    if options.memory is None:  # a caller takes the frames that are asked for
+        if end < stop:
+            raise TopologyChange.at(f"{path}: its meshes take turns, and at frame {end} others are shown", end, first)
+        return opened.some(own, float(times[first])), times, None
     return opened.some(own, float(times[first])), times[first:end], end if end < stop else None
 
 

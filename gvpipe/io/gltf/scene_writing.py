@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from gvpipe.asset.metadata import Metadata
-from gvpipe.foundation.arrays import Array, Float32, Float64
+from gvpipe.foundation.arrays import Array, Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute, as_gltf, name_attributes
+from gvpipe.io.gltf.draco_writing import Fineness, add_primitive, fineness
 from gvpipe.io.gltf.glb import INDICES, VERTICES, Glb
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.material_writing import write_materials
@@ -102,6 +104,7 @@ def write_scene(
     more: tuple[GltfAttribute, ...] = (),
     is_skinned: bool = False,
     step: float = 0.0,
+    is_morphed: bool = False,
 ) -> list[Written]:
     """Add the whole scene.
 
@@ -111,7 +114,8 @@ def write_scene(
         positions: ``(W, 3)`` of the split vertices; integers of a `Lattice`, or float32.
         more: attributes of this frame alone.
         is_skinned: joints place the meshes, whose nodes are then roots.
-        step: how far off packed positions may be; 0: not at all.
+        step: how far off compressed positions may be; 0: not at all.
+        is_morphed: meshes may get morph targets, which have the order of their vertices.
     """
     sequence = prepared.sequence
     numbers = write_materials(glb, sequence.materials, sequence.images, prepared.uv_sets)
@@ -121,8 +125,10 @@ def write_scene(
     attributes = tuple(map(quantized, (*prepared.attributes, *more))) if glb.is_packed else (*prepared.attributes, *more)
     if positions.dtype != np.float32 or (glb.is_packed and any(map(needs_extension, attributes))):
         glb.use(EXTENSION, is_required=True)
+    fine = fineness(positions, step) if glb.is_draco else None
+    vertices = _Vertices(positions, attributes, step, fine, is_morphed)
     for shape in prepared.split.shapes:
-        mesh = _write_mesh(glb, shape, positions, attributes, step, numbers)
+        mesh = _write_mesh(glb, shape, vertices.of(shape), numbers)
         node = glb.append("nodes", {"mesh": mesh} | ({"name": shape.name} if shape.name else {}))
         written.append(Written(node, mesh, shape))
         if is_skinned or not shape.parent:
@@ -141,22 +147,47 @@ def write_scene(
     return written
 
 
-def _write_mesh(
-    glb: Glb, shape: Shape, positions: Array, attributes: tuple[GltfAttribute, ...], step: float, materials: list[int]
-) -> int:
-    own_positions = positions[shape.start : shape.stop]
-    filtered = steps_of(own_positions, step) if step and glb.is_packed else None
-    accessors = {"POSITION": glb.array(own_positions, VERTICES, bounds=True, filtered=filtered)}
-    for one in attributes:
-        own = one.part(shape.start, shape.stop)
-        accessors[one.name] = glb.array(own.values, VERTICES, normalized=own.normalized, filtered=own.filtered)
+class _Vertices(NamedTuple):
+    """Vertices of meshes: ``positions (W, 3)``, attributes, and how they are compressed, see `write_scene`."""
+
+    positions: Array
+    attributes: tuple[GltfAttribute, ...]
+    step: float
+    fine: Fineness | None
+    is_morphed: bool
+
+    def of(self, shape: Shape) -> _Vertices:
+        """Those of a mesh."""
+        own = tuple(one.part(shape.start, shape.stop) for one in self.attributes)
+        return self._replace(positions=self.positions[shape.start : shape.stop], attributes=own)
+
+
+def _write_mesh(glb: Glb, shape: Shape, vertices: _Vertices, materials: list[int]) -> int:
+    accessors: dict[str, int] = {}  # that primitives share
     primitives = []
     for faces, material in shape.primitives:
-        small = shape.stop - shape.start < 65536  # the largest number of a type is no vertex
-        corners = faces.reshape(-1, 1).astype(np.uint16 if small else np.uint32)
-        item: Json = {"attributes": accessors, "indices": glb.array(corners, INDICES)}
+        item = _compressed(glb, vertices, faces)
+        if item is None:
+            accessors = accessors or _write_vertices(glb, vertices)
+            small = len(vertices.positions) < 65536  # the largest number of a type is no vertex
+            corners = faces.reshape(-1, 1).astype(np.uint16 if small else np.uint32)
+            item = {"attributes": accessors, "indices": glb.array(corners, INDICES)}
         primitives.append(item | ({} if material is None else {"material": materials[material]}))
     return glb.append("meshes", {"primitives": primitives} | ({"name": shape.name} if shape.name else {}))
+
+
+def _compressed(glb: Glb, vertices: _Vertices, faces: Int32) -> Json | None:
+    if vertices.fine is None:
+        return None
+    return add_primitive(glb, vertices.positions, vertices.attributes, faces, vertices.fine, vertices.is_morphed)
+
+
+def _write_vertices(glb: Glb, vertices: _Vertices) -> dict[str, int]:
+    filtered = steps_of(vertices.positions, vertices.step) if vertices.step and glb.is_packed else None
+    accessors = {"POSITION": glb.array(vertices.positions, VERTICES, bounds=True, filtered=filtered)}
+    for one in vertices.attributes:
+        accessors[one.name] = glb.array(one.values, VERTICES, normalized=one.normalized, filtered=one.filtered)
+    return accessors
 
 
 def normals_of(prepared: Prepared, number: int, positions: Float32) -> GltfAttribute | None:

@@ -23,6 +23,7 @@ from gvpipe.foundation.arrays import Array, Bool, Float32, Float64, Int32, Int64
 from gvpipe.foundation.errors import InputError
 from gvpipe.io.gltf.attribute_writing import GltfAttribute
 from gvpipe.io.gltf.clips import FPS
+from gvpipe.io.gltf.draco_writing import draco_notes
 from gvpipe.io.gltf.glb import Filtered, Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.meshopt.writing import QUATERNION_BITS, pack_quaternions
@@ -44,14 +45,15 @@ TINY, FLAT = 1e-100, 1e-6  # FLAT: of a cube's volume
 ANGLE = 1.3  # radians: what rounding turns a rotation by, times the largest integer
 
 
-def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: bool = False) -> tuple[str, ...]:
+def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, compress: str = "none") -> tuple[str, ...]:
     """Write a sequence as the skin moves it; return what the file cannot hold, a line each.
 
     Args:
         sequence: its triangles, attributes, parts and materials.
         skin: of its vertices, and of as many frames.
         path: of the ``.glb``.
-        is_packed: compressed, by EXT_meshopt_compression and KHR_mesh_quantization.
+        compress: ``"meshopt"``: by EXT_meshopt_compression and KHR_mesh_quantization; ``"draco"``: the bind pose by
+            KHR_draco_mesh_compression; or ``"none"``.
 
     Raises:
         InputError: the skin has too many joints, or the file would be longer than a GLB can be.
@@ -59,12 +61,13 @@ def write_skinned(sequence: MeshSequence, skin: Skin, path: Path, is_packed: boo
     """
     if skin.joints > MAX_JOINTS:
         raise InputError(f"{path}: {skin.joints} joints; glTF holds {MAX_JOINTS}, so make the skin with fewer")
-    prepared = prepare(sequence, is_packed=is_packed, is_skinned=True)
-    with glb_at(path, is_packed) as glb:
+    prepared = prepare(sequence, is_packed=compress == "meshopt", is_skinned=True)
+    with glb_at(path, compress) as glb:
         _write(glb, prepared, skin)
+        said = draco_notes(glb) if glb.is_draco else ()
     parents = any(shape.parent for shape in prepared.split.shapes)
     turned = prepared.normals is not None
-    return (*prepared.notes, *((NO_PARENTS,) if parents else ()), *((TURNED_NORMALS,) if turned else ()))
+    return (*prepared.notes, *said, *((NO_PARENTS,) if parents else ()), *((TURNED_NORMALS,) if turned else ()))
 
 
 def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
@@ -92,11 +95,12 @@ def _write(glb: Glb, prepared: Prepared, skin: Skin) -> None:
             positions = integers[sources].astype(np.uint16)
         else:
             lattice = None
-    written = write_scene(glb, prepared, positions, shown, is_skinned=True)
+    rounding = limit / _stretch(skin, np.arange(len(skin.bind))) if glb.is_draco else 0.0
+    written = write_scene(glb, prepared, positions, shown, is_skinned=True, step=rounding, is_morphed=len(skin.shapes) > 0)
     for one in written:
         glb.tree["nodes"][one.node]["skin"] = 0
     unit = 1.0 if lattice is None else lattice.step
-    step = keys.precision / max(np.sqrt(len(skin.shapes)), 1) / _stretch(skin)
+    step = keys.precision / max(np.sqrt(len(skin.shapes)), 1) / _stretch(skin, np.flatnonzero(skin.shapes.any(axis=(0, 2))))
     shaped = _write_shapes(glb, written, skin, sources, unit, step / unit)
     if skin.parents is None:
         numbers = [_write_joint(glb, keys.nodes, j) for j in range(skin.joints)]
@@ -161,9 +165,8 @@ def _write_shape_keys(
         tree["channels"].append({"sampler": known[used.tobytes()], "target": {"node": node, "path": "weights"}})
 
 
-def _stretch(skin: Skin) -> float:
-    """How much longer joints make what shapes add to a vertex, at most, in some of the frames; at least 1."""
-    changed = np.flatnonzero(skin.shapes.any(axis=(0, 2)))
+def _stretch(skin: Skin, changed: Int64) -> float:
+    """How much longer joints make what is added to vertices ``(n,)``, at most, in some of the frames; at least 1."""
     blends = (skin.blended(k)[changed, :, :3] for k in _some_frames(skin)) if len(changed) else ()
     return max(1.0, *(math.sqrt(np.square(each).sum(axis=(1, 2)).max() / 3) for each in blends), 1.0)
 

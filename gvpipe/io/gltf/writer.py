@@ -16,6 +16,7 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float32, Float64
 from gvpipe.io.gltf.clips import FPS
+from gvpipe.io.gltf.draco_writing import draco_notes
 from gvpipe.io.gltf.glb import Glb, glb_at
 from gvpipe.io.gltf.json_fields import Json
 from gvpipe.io.gltf.morph_writing import write_deltas
@@ -54,22 +55,23 @@ def encode_glb(sequence: MeshSequence, shared: str) -> FrameEncoder:
     return FrameEncoder(encode, fields, prepared.notes)
 
 
-def write_animated(sequence: MeshSequence, path: Path, is_packed: bool = False) -> tuple[str, ...]:
+def write_animated(sequence: MeshSequence, path: Path, compress: str = "none") -> tuple[str, ...]:
     """Write a sequence as one animated GLB, or one frame as a still one; return what it cannot hold, a line each.
 
     Args:
         sequence: to be written.
         path: of the ``.glb``.
-        is_packed: compressed by EXT_meshopt_compression, positions within `quantizing.EXACT`.
+        compress: ``"meshopt"`` or ``"draco"``, with positions within `quantizing.EXACT`; or ``"none"``.
 
     Raises:
         InputError: it would be longer than a GLB can be.
         OutputError: the file cannot be written.
     """
-    prepared = prepare(sequence, is_packed=is_packed)
-    with glb_at(path, is_packed) as glb:
+    prepared = prepare(sequence, is_packed=compress == "meshopt")
+    with glb_at(path, compress) as glb:
         n_targets = _write_animation(glb, prepared)
-    return (*prepared.notes, *animation_notes(n_targets))
+        said = draco_notes(glb) if glb.is_draco else ()
+    return (*prepared.notes, *animation_notes(n_targets), *said)
 
 
 @dataclass(eq=False)
@@ -114,7 +116,7 @@ def write_moving(glb: Glb, prepared: Prepared) -> list[Targets]:
     first = sequence.read(0, 1)[0]
     base, normals = first[sources], normals_of(prepared, 0, first)
     step = EXACT / 2 * extent_of(first)  # of the base and of what targets add to it
-    scene = write_scene(glb, prepared, base, () if normals is None else (normals,), step=step)
+    scene = write_scene(glb, prepared, base, () if normals is None else (normals,), step=step, is_morphed=sequence.n_frames > 1)
     if sequence.n_frames == 1:
         return []
     targets = [Targets(one, step) for one in scene]

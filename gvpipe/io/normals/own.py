@@ -38,6 +38,16 @@ def entries_of(normals: Attribute, faces: Int32) -> tuple[Int64, Int64]:
     return entries.reshape(-1), first
 
 
+def are_smooth(normals: Attribute, positions: Array, faces: Int32) -> bool:
+    """Whether each vertex has one normal, which follows from positions ``(V, 3)`` and triangles ``(T, 3)``."""
+    if normals.domain not in ("vertex", "corner"):
+        return False
+    entries, corners = entries_of(normals, faces)
+    rows = corners if normals.domain == "corner" else faces.reshape(-1)[corners]
+    is_one_each = len(corners) == len(np.unique(faces))
+    return is_one_each and own_rule(np.asarray(normals)[rows], positions, faces, entries) is not None
+
+
 def first_normals_note(attributes: Mapping[str, Attribute], faces: Int32, frames: Frames) -> tuple[str, ...]:
     """What to say of normals that change in a file: nothing if they follow from the surface in the first frame.
 

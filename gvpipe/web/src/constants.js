@@ -214,6 +214,9 @@ export const GRAPH_LEAST = 0.05;
 export const HEAD_MAX_VALUES = 16777216;
 export const HEAD_VERSION = 1;
 
+// gvpipe.fields.prediction
+export const PREDICTION_TUNINGS = [[[0.15, 1.5, 0.25, 0.05, 0.2], [0.05, 0.3, 1.0, 0.3, 0.05]], [[0.15, 0.03, 0.12, 0.1, 0.9], [0.05, 0.01, 1.35, 0.05, 0.12]]];
+
 // gvpipe.fields.prediction_kernels
 export const PREDICTION_KERNELS_STEPS = 0;
 export const PREDICTION_KERNELS_WHOLE = 1;
@@ -232,6 +235,7 @@ export const RESIDUAL_KERNELS_N_MIXERS = 64;
 export const SEGMENT_EXACT = 0;
 export const SEGMENT_TRAJECTORIES = 2;
 export const SEGMENT_DERIVED = 3;
+export const SEGMENT_TUNED = 4;
 
 // gvpipe.fields.values
 export const VALUES_MAX_COMPONENTS = 256;

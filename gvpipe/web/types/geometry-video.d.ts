@@ -131,14 +131,18 @@ export interface Cut {
   readonly sign: 1 | -1;
 }
 
-/** A point of the mesh that was pointed at. */
+/** A point of the mesh that was pointed at, or of the section of a cut. */
 export interface Picked {
-  /** The nearest vertex of the triangle, or of the points. */
-  readonly vertex: number;
-  /** null: the mesh has no triangles. */
+  /** The nearest vertex of the triangle, or of the points; null: a point inside, of a section. */
+  readonly vertex: number | null;
+  /** null: the mesh has no triangles, or it is a section. */
   readonly triangle: number | null;
   /** Name of its part; null if there are none. */
   readonly part: string | null;
+  /** Of a section: a point of the grid near it. The surface's vertices come first, then inner points. */
+  readonly point?: number;
+  /** Of a section: the cell. */
+  readonly cell?: number;
 }
 
 export interface Texture {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gvcodecs.mcgv.base.base_lattice import base_step, choose_lattice, quantise_base
+from gvcodecs.mcgv.base.base_lattice import base_step, choose_lattice, quantise_base, weld_step
 from gvcodecs.mcgv.base.welded_points import Points
 from gvcodecs.mcgv.encode_job import Job
 from gvpipe.connectivity.base_mesh import EncodedMesh
@@ -20,7 +20,7 @@ from gvpipe.trajectory.still_vertices import encode_flags, find_still
 from gvpipe.trajectory.welding import find_points
 
 MAX_SEGMENTS = 4000  # one section each, of the 4096 that a bitstream may have
-MERGED = 1 / 16  # steps that vertices of one point may be apart: far below the errors that follow
+MERGED = 1 / 16  # parts of `weld_step` that vertices of one point may be apart: far below the errors that follow
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def begin(job: Job, step: float, target_error: float, before: Start | None = Non
     job.report("base", 0)
     first = given.read(0, 1)[0]
     still = job.memo("still", lambda: find_still(given))
-    point = before.point if before else _weld(given, still, MERGED * step)
+    point = before.point if before else _weld(given, still, MERGED * weld_step(settings, first, step))
     adaptive = before.coded.is_adaptive if before else settings.is_blended
     members = np.unique(point, return_index=True)[1]
     lattice = choose_lattice(settings, first[members], min(base_step(step, given.n_frames), target_error))

@@ -24,6 +24,16 @@ def base_step(step: float, n_frames: int) -> float:
     return BASE_STEP * step / math.sqrt(n_frames)
 
 
+def weld_step(settings: Settings, first: Float32, step: float) -> float:
+    """The step by which vertices are one point, model units: a quantisation step, but no more than a base lattice.
+
+    A mesh whose neighbours merge costs more, not less. As published, the target error touches no point.
+    """
+    if not settings.is_blended:
+        return Lattice.over(first, AFFINE_BITS).step
+    return min(step, Lattice.over(first, BITS[0]).step)
+
+
 def choose_lattice(settings: Settings, first: Float32, step: float) -> Lattice:
     """Return a lattice of about ``step``, model units, that keeps most points ``first (P, 3)`` of the first frame distinct."""
     if settings.base_bits or not settings.is_blended:

@@ -13,10 +13,10 @@ import numpy as np
 from gvcodecs.mcgv.base.surface import read_surface
 from gvcodecs.mcgv.header import Header
 from gvcodecs.mcgv.motion.blended import decode_transforms, read_blend
-from gvcodecs.mcgv.motion.skinning import TOTAL
+from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.segments import segment_starts
-from gvpipe.foundation.arrays import Float32, Float64
+from gvpipe.foundation.arrays import Float32, Float64, Int32, Int64
 from gvpipe.model.skin import INFLUENCES, Skin
 
 BYTES_PER_JOINT, SECONDS_PER_JOINT = 1024, 1e-6  # of a frame; keys take most of it
@@ -46,16 +46,28 @@ def read_skin(bitstream: Bitstream) -> Skin | None:
         own = blend.transforms(rows).reshape(header.clusters, 4, stop - start, 3)  # y @ own
         transforms[start:stop, :-1, :3] += np.einsum("kifc,ij->fkcj", own, to_unit)
     n_vertices = bitstream.n_vertices
-    indices = np.full((n_vertices, INFLUENCES), 0, np.int32)
-    weights = np.zeros((n_vertices, INFLUENCES), np.float32)
-    indices[:, 0], weights[:, 0] = header.clusters, 1
-    indices[surface.vertices] = blend.weights.clusters[surface.slot]
-    weights[surface.vertices] = blend.weights.weights[surface.slot] / np.float32(TOTAL)  # exact: TOTAL is a power of two
+    indices, weights = influences(n_vertices, surface.vertices, surface.slot, blend.weights, header.clusters)
     bind: Float32 = np.empty((n_vertices, 3), np.float32)
     surface.fill_still(bind[None])
     bind[surface.vertices] = surface.base[surface.slot]
     used = len(surface.vertices) < n_vertices
     return Skin(indices, weights, bind, transforms if used else transforms[:, :-1])
+
+
+def influences(n_vertices: int, vertices: Int64, points: Int64, blend: Weights, n_clusters: int) -> tuple[Int32, Float32]:
+    """Joints and weights ``(V, 4)``: clusters are joints, and one more, which stands still, has the vertices that never move.
+
+    Args:
+        n_vertices: V.
+        vertices, points: ``(M,)`` those that move, and the point of each.
+        blend: of the points.
+        n_clusters: K.
+    """
+    indices, weights = np.zeros((n_vertices, INFLUENCES), np.int32), np.zeros((n_vertices, INFLUENCES), np.float32)
+    indices[:, 0], weights[:, 0] = n_clusters, 1
+    indices[vertices] = blend.clusters[points]
+    weights[vertices] = blend.weights[points] / np.float32(TOTAL)  # exact: TOTAL is a power of two
+    return indices, weights
 
 
 def _to_unit(base: Float64, homogeneous: Float64) -> Float64:

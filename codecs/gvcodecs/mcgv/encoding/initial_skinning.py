@@ -17,8 +17,8 @@ def fit_skinning(job: Job, start: Start, target_error: float, before: Fitted | N
 
     ``target_error`` 0: the step is that of the start. The last blend is kept: asked for again, it is the same object.
     """
-    kept = job.memo("fits", dict[tuple[str, float, float], tuple[Fitted, float]])
-    key = (start.key, start.step, target_error)
+    kept = job.memo("fits", dict[tuple[str, float, float, int], tuple[Fitted, float]])
+    key = (start.key, start.step, target_error, job.settings.clusters)
     if key in kept:
         return kept[key]
     job.report("segment", 0)

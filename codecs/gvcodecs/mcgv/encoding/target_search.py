@@ -23,18 +23,19 @@ from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, ref
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.metrics.vertex_errors import measure_spread
-from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step, nearest
+from gvpipe.rate_control.step_search import COARSEST, SLOPE, Goal, StepTrial, find_step, nearest
 
 
 def encode_to_target(job: Job) -> Encoded:
     """Code a sequence with the error that its quality asks for."""
-    target_error = error_of(job.settings.quality) / 100 * job.memo("spread", lambda: measure_spread(job.sequence))
+    target_error = error_of(job.settings.quality) / 100 * _spread(job)
     anchors = job.memo("anchors", list[CandidateAnchor])
     anchor = nearest(anchors, target_error)
     if anchor and (not anchor.candidate.fitted or abs(anchor.distance(target_error)) < TUNING.reuse_within):
         return _reuse(job, anchor, target_error)  # what was measured at another quality serves this one
     trials, trial = _aim(job, target_error)
-    anchors.append(CandidateAnchor.of(trials.candidate, trial))
+    if trial.step != _coarsest(job):  # which tells nothing of other errors
+        anchors.append(CandidateAnchor.of(trials.candidate, trial))
     if not job.memo.is_shared and not trials.candidate.start.pictures:  # who searches a quality asks for no more than its error
         trial = refine(trials, trial)
     return trial.encoded
@@ -53,7 +54,7 @@ def _aim(job: Job, target_error: float) -> tuple[StepTrials, StepTrial]:
     trials, step = _begin(job, TUNING.guess(job.settings.prediction) * target_error, target_error, target_error)
     if trials.candidate.fitted:
         trials, step = _fit_for_error(trials, step, target_error)
-    goal = Goal(target_error, TUNING.close_enough(job.settings.prediction), SLOPE)
+    goal = Goal(target_error, TUNING.close_enough(job.settings.prediction), SLOPE, coarsest=_coarsest(job))
     if job.settings.may_omit_pictures:
         found = omit_pictures(trials, step, target_error, goal.close_enough)
         if found:
@@ -84,6 +85,15 @@ def _fit_for_error(trials: StepTrials, step: float, target_error: float) -> tupl
     factor = _limited(math.log(TUNING.second_blend * target_error / max(first.error, TUNING.no_error * target_error)))
     others, other_step = _begin(trials.job, step * factor, target_error, 0.0)
     return (trials, step) if cost(first) < cost(others(other_step)) else (others, other_step)
+
+
+def _spread(job: Job) -> float:
+    return job.memo("spread", lambda: measure_spread(job.sequence))
+
+
+def _coarsest(job: Job) -> float | None:
+    """The step whose pictures are empty, model units; None where transforms have the pictures' step, too."""
+    return None if job.settings.is_blended else COARSEST * _spread(job)
 
 
 def _limited(move: float) -> float:

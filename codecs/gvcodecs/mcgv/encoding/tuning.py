@@ -26,6 +26,7 @@ class Tuning:
         bare_rounds: encodes in one search without pictures (0075).
         least_pictures: part of the bytes that pictures must take for an encode without them to be tried (0075).
         bare_finer: error that a blend alone is to leave at its second attempt (0075).
+        nearly: error of that attempt up to which there is a third (0075).
         coarsest_bases: lattice steps of base frames, in target errors (0068).
         large_base: part of the bytes that a base frame must take for the second of them to be tried (0068).
         rebased_by: a coarser base frame has so many times the lattice step at least (0068).
@@ -52,6 +53,7 @@ class Tuning:
     bare_rounds: int = 5
     least_pictures: float = 0.02
     bare_finer: float = 0.95
+    nearly: float = 1.25
     coarsest_bases: tuple[float, float] = (1.0, 1.3)
     large_base: float = 0.25
     rebased_by: float = 1.2

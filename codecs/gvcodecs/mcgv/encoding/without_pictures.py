@@ -19,10 +19,12 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step
 
+FINER = 2  # finer steps for a blend alone, the second where the first nearly met the target error
+
 
 def approach(trials: StepTrials, anchor: CandidateAnchor, step: float, target_error: float) -> StepTrial:
     """Come close to a target error from an anchor; it follows the step less: base frame and blend have errors of their own."""
-    return find_step(trials, step, Goal(target_error, TUNING.bare_error, anchor.slope, TUNING.bare_rounds, levels_off=True))
+    return find_step(trials, step, _goal(target_error, TUNING.bare_error, anchor.slope))
 
 
 def omit_pictures(
@@ -71,14 +73,19 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     most = cost(trial, TUNING.fine_worth)
     if cost(finer(step), TUNING.fine_worth) > most:
         return trial
-    fine = find_step(finer, step, Goal(fine_error, TUNING.fine_error, SLOPE, TUNING.bare_rounds, levels_off=True))
+    fine = find_step(finer, step, _goal(fine_error, TUNING.fine_error))
     return fine if fine.error <= fine_error and cost(fine, TUNING.fine_worth) <= most else trial
 
 
 def _find(trials: StepTrials, step: float, target_error: float, close_enough: tuple[float, float]) -> StepTrial:
     """An encode of about a target error; or a finer one, where that costs next to nothing and no other encode is compared."""
     counted = None if trials.job.memo.is_shared else cost
-    return find_step(trials, step, Goal(target_error, close_enough, SLOPE, TUNING.bare_rounds, levels_off=True, cost=counted))
+    return find_step(trials, step, dataclasses.replace(_goal(target_error, close_enough), cost=counted))
+
+
+def _goal(target_error: float, close_enough: tuple[float, float], slope: float = SLOPE) -> Goal:
+    """An error that a blend alone is to leave; a larger one than the target is refused, so that a finer step is better."""
+    return Goal(target_error, close_enough, slope, TUNING.bare_rounds, levels_off=True, most=1.0)
 
 
 def _smallest_base(job: Job, candidate: Candidate, step: float, fine_error: float) -> Candidate:
@@ -99,8 +106,11 @@ def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> 
     trial = trials.alone(step)
     if cost(trial) > cost(whole):
         return False
-    if trial.error > target_error:
-        trial = trials.alone(step * (TUNING.bare_finer * target_error / trial.error) ** (1 / SLOPE))
+    for _ in range(FINER):
+        if trial.error > target_error:
+            trial = trials.alone(trial.step * (TUNING.bare_finer * target_error / trial.error) ** (1 / SLOPE))
+        if trial.error > TUNING.nearly * target_error:
+            break
     return trial.error <= target_error
 
 

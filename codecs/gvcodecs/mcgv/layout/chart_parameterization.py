@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from gvcodecs.mcgv.layout.xatlas_process import run_xatlas
 from gvpipe.foundation.arrays import Float64, Int32, Int64
 from gvpipe.mesh.topology import adjacency
+from gvpipe.mesh.xatlas_process import PATCH, patches_of, run_xatlas
 
-PATCH = 1 << 13  # triangles that xatlas gets at once: its time grows with their square
 SMALL_CHART = 12  # points; a chart below dissolves into a neighbour
 UNASSIGNED = 0xFFFFFFFF
+REMEDY = "--set placement=halves needs none"  # of charts
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
     for k in range(n_clusters):
         touching = solid[(clusters[solid] == k).any(axis=1)]
         is_cut = len(touching) > PATCH
-        for patch in _patches(unit, touching):
-            points, indices = np.unique(patch, return_inverse=True)
+        for patch in patches_of(unit, touching, PATCH):
+            points, indices = np.unique(touching[patch], return_inverse=True)
             places, extent = unit[points], 1.0
             if is_cut:  # xatlas drops triangles of less than 1e-7 square units
                 extent = float(np.ptp(places, axis=0).max())
@@ -95,7 +95,7 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
     if not sources:
         return chart, uv
     first = 0
-    for (k, points, extent), (vertex, indices, places, own) in zip(sources, run_xatlas(meshes), strict=True):
+    for (k, points, extent), (vertex, indices, places, own) in zip(sources, run_xatlas(meshes, REMEDY), strict=True):
         own = np.asarray(own, np.int64)
         point = points[np.asarray(vertex, np.int64)]
         own = np.where(own == UNASSIGNED, -1, own)
@@ -109,17 +109,6 @@ def _xatlas(unit: Float64, faces: Int32, clusters: Int32, n_clusters: int) -> tu
         uv[point[order]] = extent * places[order]
         first += int(own.max()) + 1
     return chart, uv
-
-
-def _patches(unit: Float64, faces: Int32) -> list[Int32]:
-    """Cut triangles ``(m, 3)`` into halves of like size across their longest side, until none has more than `PATCH`."""
-    if len(faces) <= PATCH:
-        return [faces] if len(faces) else []
-    centres = unit[faces].mean(axis=1)
-    along = centres[:, int(np.ptp(centres, axis=0).argmax())]
-    order = np.argsort(along, kind="stable")
-    half = len(faces) // 2
-    return [part for side in (order[:half], order[half:]) for part in _patches(unit, faces[np.sort(side)])]
 
 
 def _absorb(chart: Int64, uv: Float64, neighbours: sparse.csr_array, clusters: Int32) -> tuple[Int64, Float64]:

@@ -82,6 +82,11 @@ def fit_blend(
     return _search(motions, step, n_clusters, target_error, motions.start(n_clusters or 1))
 
 
+def settle(motions: Motions | SampledMotions, step: float, fitted: Fitted, passes: int) -> Fitted:
+    """A blend after more turns of transforms and weights, which a file would not pay for; see `fit_blend`."""
+    return _alternate(motions.problem(step), fitted, passes)
+
+
 def _search(motions: Motions, step: float, n_clusters: int, target_error: float, start: Fitted) -> tuple[Fitted, float]:
     """As `fit_blend`, from a blend on."""
     for _ in range(ROUNDS):

@@ -176,3 +176,8 @@ function longest(values, components) {
   }
   return Math.sqrt(most);
 }
+
+/** The frame of a field that frame k of the video shows: one that stands still has one. @param {{frameCount: number}} field @param {number} k */
+export function frameOf(field, k) {
+  return Math.min(k, field.frameCount - 1);
+}

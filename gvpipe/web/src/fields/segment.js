@@ -1,6 +1,7 @@
 /** One segment of a field, from bytes to values. Mirrors `gvpipe.fields.segment`. */
 
 import {
+  PREDICTION_TUNINGS as TUNINGS,
   PREDICTION_KERNELS_FLOATS as FLOATS,
   PREDICTION_KERNELS_N_FILTERS as N_FILTERS,
   PREDICTION_KERNELS_N_SHARED as N_SHARED,
@@ -10,6 +11,7 @@ import {
   SEGMENT_DERIVED as DERIVED,
   SEGMENT_EXACT as EXACT,
   SEGMENT_TRAJECTORIES as TRAJECTORIES,
+  SEGMENT_TUNED as TUNED,
 } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
@@ -39,7 +41,7 @@ export async function decodeSegment(data, shape, type, place) {
   const shown = decodeHolds(cursor.block(), frames, place.name);
   const mode = cursor.u8();
   const flags = cursor.take(components);
-  if (mode > DERIVED || flags.some((flag) => flag > 1)) throw cursor.corrupt(`its mode is ${mode}, its flags ${flags}`);
+  if (mode > TUNED || flags.some((flag) => flag > 1)) throw cursor.corrupt(`its mode is ${mode}, its flags ${flags}`);
   const distinct = frames ? shown[frames - 1] + 1 : 0;
   const found = newValues(type, distinct * rows * components);
   if (rows) {
@@ -92,12 +94,15 @@ async function fillOthers(cursor, { mode, type, flags, shown }, found, place) {
       const firsts = [...shown.keys()].filter((k) => !k || shown[k] !== shown[k - 1]);
       base = await derivedValues(derivation, firsts, place.span);
     }
+    const tuning = mode === TUNED ? cursor.u8() : 0;
+    if (tuning >= TUNINGS.length) throw cursor.corrupt(`its filters have constants of number ${tuning}`);
     const residuals = decodeResiduals(kernels, causal, cursor.rest(), [width * frames, frames], name, still);
     const decoded = kernels.array("float64", [rows, width * frames]);
     const kind = mode !== EXACT ? STEPS : isWhole ? WHOLE : FLOATS;
     const unit = kind === FLOATS ? step : 0;
     const [target, learnt] = [kernels.array("float64", [0, 0]), kernels.array("float64", [rows, N_FILTERS, N_SHARED + 2])];
-    const given = [...causal, frames, still, kind, unit, residuals, decoded, target, learnt];
+    const constants = kernels.array("float64", [N_FILTERS, TUNINGS[0][0].length], TUNINGS[tuning].flat());
+    const given = [...causal, frames, still, kind, unit, constants, residuals, decoded, target, learnt];
     inBlocks(rows, (first, end) => kernels.call("predict_rows", ...given, first, end));
     const view = kernels.view(decoded);
     value = (row, k, frame) => view[(row * width + k) * frames + frame];

@@ -5,6 +5,7 @@ import { isBare, readBare } from "./bare.js";
 import { Budget } from "./budget.js";
 import { CONTAINER_VERSION, newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
+import { describedIn } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
 import { clipName, readHeader, setFrames } from "./header.js";
@@ -56,7 +57,8 @@ async function readBarePayload({ payload, bytes, videoChecksum }, find) {
   if (!find) throw new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
   const { header, sections, sharedBytes } = await readBare(payload, find);
   const { video_crc32: checksum = 0 } = header.container; // of no pictures
-  if (checksum !== videoChecksum) throw otherVideo();
+  const hasVideo = "video_crc32" in header.container || !describedIn(header).length; // else its samples are companions' alone
+  if (hasVideo && checksum !== videoChecksum) throw otherVideo();
   const budget = new Budget(bytes + sharedBytes);
   budget.keepMesh(header);
   return new Payload(header, sections, budget);

@@ -1,5 +1,6 @@
 /** A box over the picture that says what a point of the mesh has: a field's value, now and over time, and where the point is. */
 
+import { frameOf } from "../fields/coded_field.js";
 import { formatNumber, titleOf } from "./legend.js";
 import { Trace, valueOf } from "./trace.js";
 
@@ -15,7 +16,8 @@ const MARKUP = `
 export class Probe {
   #trace = null;
   #video = null;
-  #field = null;
+  #field = null; // that has the value: the one that is shown, or its numbers inside
+  #row = 0;
   #picked = null;
   #frame = 0;
   #isPlaying = false;
@@ -40,7 +42,7 @@ export class Probe {
   /**
    * @param {import("../geometry_video.js").GeometryVideo} video
    * @param {import("../fields/coded_field.js").CodedField|null} field that is shown
-   * @param {{vertex: number, triangle: number|null, part: string|null}} picked
+   * @param {import("../volume/volume.js").Picked} picked
    * @param {number} frame
    * @returns {Promise<number|null>} the value in that frame; null if there is none
    */
@@ -53,9 +55,9 @@ export class Probe {
     this.#mark(picked.vertex);
     this.setField(field);
     if (!this.#field) return null;
-    const own = video.ownFrame(frame);
-    await this.#field.load(own);
-    const value = valueOf(field, own, this.#row);
+    const [at, row] = [this.#field, this.#row];
+    await at.load(this.#fieldFrame(frame));
+    const value = valueOf(at, frameOf(at, video.ownFrame(frame)), row);
     if (picked === this.#picked) this.setFrame(this.#frame);
     return Number.isNaN(value) ? null : value;
   }
@@ -71,7 +73,9 @@ export class Probe {
   setField(field) {
     if (!this.isOpen) return;
     this.#trace?.end();
-    this.#field = field?.kind === "color" ? null : field;
+    const found = field && field.kind !== "color" ? rowOf(this.#video, field, this.#picked) : null;
+    this.#field = found?.field ?? null;
+    this.#row = found?.row ?? 0;
     this.#trace = this.#field && new Trace(this.#field, this.#row);
     this.plot.style.display = this.#field ? "" : "none";
     this.ends.hidden = !this.#field;
@@ -88,7 +92,7 @@ export class Probe {
     if (this.#trace?.take()) this.#draw();
     this.value.textContent = this.#field ? `${titleOf(this.#field)} ${this.#valueText(frame)}` : "";
     this.place.textContent = this.#placeText(frame);
-    const x = this.#field ? (this.#video.ownFrame(frame) / Math.max(1, this.#field.frameCount - 1)) * WIDTH : 0;
+    const x = this.#field ? (this.#fieldFrame(frame) / Math.max(1, this.#field.frameCount - 1)) * WIDTH : 0;
     this.mark.setAttribute("d", `M${x} 0V${HEIGHT}`);
   }
 
@@ -99,9 +103,9 @@ export class Probe {
     this.#load();
   }
 
-  get #row() {
-    const { vertex, triangle } = this.#picked;
-    return this.#field?.domain === "triangle" ? triangle : vertex;
+  /** The frame of the field that a frame of the video shows. */
+  #fieldFrame(frame) {
+    return frameOf(this.#field, this.#video.ownFrame(frame));
   }
 
   #load() {
@@ -111,17 +115,18 @@ export class Probe {
   }
 
   #valueText(frame) {
-    const value = valueOf(this.#field, this.#video.ownFrame(frame), this.#row);
+    const value = valueOf(this.#field, this.#fieldFrame(frame), this.#row);
     if (value === null) return "…";
     if (Number.isNaN(value)) return "has no value here";
     return `${Number(value.toPrecision(6))} ${this.#field.unit}`;
   }
 
   #placeText(frame) {
-    const { vertex, triangle, part } = this.#picked;
+    const { vertex, triangle, part, point, cell } = this.#picked;
     const { metadata, fps } = this.#video;
     const time = metadata.times?.[this.#video.ownFrame(frame)] ?? frame / fps;
-    const places = [`vertex ${vertex}`, triangle === null ? "" : `triangle ${triangle}`, part ?? ""];
+    const places = [vertex === null ? `point ${point} inside` : `vertex ${vertex}`, triangle === null ? "" : `triangle ${triangle}`];
+    places.push(cell === undefined ? "" : `cell ${cell}`, part ?? "");
     return [...places, `frame ${frame}`, `${Number(time.toPrecision(6))} s`].filter(Boolean).join(" · ");
   }
 
@@ -144,4 +149,10 @@ export class Probe {
     this.ends.textContent = known.length ? `${least} to ${most} ${this.#field.unit}` : "";
     this.plot.ariaLabel = `${titleOf(this.#field)} over time, ${this.ends.textContent}`;
   }
+}
+
+/** Which field has the value of what was picked, and in which row; null: none has. */
+function rowOf(video, field, picked) {
+  if (picked.cell !== undefined) return video.volume.rowOf(field, picked);
+  return { field, row: field.domain === "triangle" ? picked.triangle : picked.vertex };
 }

@@ -1,6 +1,7 @@
 /** What a plane shows of the inside of a mesh: the section of its volume, in one colour or in the colours of a field. */
 
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh } from "three";
+import { frameOf } from "../fields/coded_field.js";
 import { length } from "../fields/length.js";
 import { Section } from "../volume/section.js";
 import { UV_NAME, fieldMaterial, partsOf, placeInMap } from "./field_colours.js";
@@ -68,12 +69,20 @@ export class FilledCut extends Mesh {
     return true;
   }
 
-  /** Whether a ray that starts at the plane starts in the section. @param {number[]} start @param {number[]} direction */
-  isMet(start, direction) {
+  /**
+   * What a ray that starts at the plane meets of the section there: the nearest point of the grid, of those whose edges meet at the nearest
+   * corner of a triangle, and the cell of that triangle.
+   *
+   * @param {number[]} start @param {number[]} direction @returns {{point: number, cell: number}|null}
+   */
+  pick(start, direction) {
     const { corners } = this;
     const indices = Uint32Array.from({ length: corners.length / 3 }, (_, i) => i);
     const before = start.map((value, axis) => value - direction[axis]);
-    return pickTriangle(before, direction, corners, indices, [[0, indices.length / 3]], 1 + NEAR) !== null;
+    const met = pickTriangle(before, direction, corners, indices, [[0, indices.length / 3]], 1 + NEAR);
+    if (!met) return null;
+    const { ends, parts, cells } = this.#section;
+    return { point: ends[2 * met.vertex + (parts[met.vertex] > 0.5 ? 1 : 0)], cell: cells[met.triangle] };
   }
 
   dispose() {
@@ -158,11 +167,6 @@ export class FilledCut extends Mesh {
 
 function numberOf(values, row, width) {
   return width > 1 ? length(values, row * width, width) : values[row];
-}
-
-/** The frame of a field that frame k of the video shows: one that stands still has one. */
-function frameOf(field, k) {
-  return Math.min(k, field.frameCount - 1);
 }
 
 function valuesOf(field, k) {

@@ -349,7 +349,7 @@ export class GeometryVideoMesh extends Mesh {
    * What of the frame shown a ray meets first, hidden parts apart.
    *
    * @param {import("three").Ray} ray in the geometry's units
-   * @returns {{vertex: number, triangle: number|null, part: string|null}|null} a triangle and its nearest vertex
+   * @returns {import("../volume/volume.js").Picked|null} a triangle and its nearest vertex; of the section of a cut a cell and its point
    */
   pick({ origin, direction }) {
     const { video, framePositions } = this;
@@ -358,7 +358,8 @@ export class GeometryVideoMesh extends Mesh {
       return met && { ...met, part: partOf(video.parts, "vertices", met.vertex) };
     }
     const { start, most, enters } = uncutRay(origin.toArray(), direction.toArray(), this.cut);
-    if (enters && this.#fill?.isMet(start, direction.toArray())) return null; // the section has no vertices of the surface
+    const inside = enters ? this.#fill?.pick(start, direction.toArray()) : null;
+    if (inside) return { ...inside, vertex: inside.point < video.vertexCount ? inside.point : null, triangle: null, part: null };
     const met = pickTriangle(start, direction.toArray(), framePositions, video.indices, this.#parts.visible, most);
     return met && { ...met, part: partOf(video.parts, "triangles", met.triangle) };
   }

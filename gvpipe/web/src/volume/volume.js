@@ -85,6 +85,15 @@ async function sectionOf(payload, name) {
 }
 
 /**
+ * What a ray meets: of the surface a triangle and its nearest vertex; of a section a cell, and a point of the grid near it, which is a vertex or
+ * lies inside.
+ *
+ * @typedef {object} Picked
+ * @property {number|null} vertex @property {number|null} triangle @property {string|null} part
+ * @property {number} [point] @property {number} [cell] of a section alone
+ */
+
+/**
  * Points are numbered: the surface's vertices, then inner ones.
  *
  * @typedef {object} Grid
@@ -154,6 +163,20 @@ export class Volume {
     const rows = domain === "point" ? this.#counts.inner : this.grid.inner.length;
     const field = rows ? this.#fieldOf(found.entry, found.moves ? this.#surface.frameCount : 1, rows, found.reduction) : null;
     return { field, moves: found.moves };
+  }
+
+  /**
+   * Where a field has the value of what was picked on a section: in a row of its own, or of its numbers inside.
+   *
+   * @param {CodedField} field of the surface @param {{point: number, cell: number}} picked
+   * @returns {{field: CodedField, row: number}|null} null: nothing is known there
+   */
+  rowOf(field, { point, cell }) {
+    const isCell = field.domain === "triangle";
+    const own = isCell ? this.grid.triangles[cell] : point < this.#counts.vertices ? point : -1;
+    if (own >= 0) return { field, row: own };
+    const inside = this.number(isCell ? "cell" : "point", field.name)?.field;
+    return inside ? { field: inside, row: isCell ? this.grid.rows[cell] : point - this.#counts.vertices } : null;
   }
 
   #fieldOf(entry, frameCount, rowCount, reduction) {

@@ -13,9 +13,9 @@ import traceback
 from typing import Any
 
 MAX_COST = 8.0  # xatlas' limit for growing a chart (its default is 2): fewer, larger charts cost fewer blocks
-TEXELS_PER_UNIT = 64.0  # only a scale here: charts are packed into blocks by `packing`
+TEXELS_PER_UNIT = 64.0  # only a scale, where others pack the charts
 
-Mesh = tuple[Any, Any]  # positions (n, 3) float32, triangles (m, 3) uint32
+Mesh = tuple[Any, ...]  # positions (n, 3) float32, triangles (m, 3) uint32; other arguments of `charts_of`
 Charts = tuple[Any, Any, Any, Any]  # of one mesh, see `charts_of`
 _atlases: list[Any] = []  # they stay until the process ends, so that none is destroyed
 
@@ -28,11 +28,11 @@ def main() -> None:
     answers.flush()
 
 
-def charts_of(positions: Any, triangles: Any) -> Charts:
+def charts_of(positions: Any, triangles: Any, texels_per_unit: float = TEXELS_PER_UNIT, padding: int = 0) -> Charts:
     """Charts of a mesh, by an atlas of its own: of two meshes in one, the second may free what the first's thread reads.
 
     Returns the vertex ``(k,)`` of each place, triangles ``(t, 3)`` of places, the places ``(k, 2) float64`` in the mesh's unit,
-    and the chart ``(k,) uint32`` of each place.
+    and the chart ``(k,) uint32`` of each place. Charts are packed into one picture, ``padding`` texels apart.
     """
     import xatlas
 
@@ -41,7 +41,8 @@ def charts_of(positions: Any, triangles: Any) -> Charts:
     atlas.add_mesh(positions, triangles)
     options, packing = xatlas.ChartOptions(), xatlas.PackOptions()
     options.max_cost = MAX_COST
-    packing.texels_per_unit = TEXELS_PER_UNIT
+    packing.texels_per_unit = texels_per_unit
+    packing.padding = padding
     packing.rotate_charts = False
     atlas.generate(options, packing)
     vertex, corners, places = atlas.get_mesh(0)

@@ -1,0 +1,1 @@
+"""The numbered claims of the codecs' papers, measured here."""

@@ -1,0 +1,126 @@
+"""What every baseline promises: the error that quality asks for, vertices and triangles in order, one error for bad bytes."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from functools import cache, partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sequences import awkward, same_triangles, waving
+
+from gvbaselines.baseline import Baseline
+from gvpipe.coding.codec import Encoded
+from gvpipe.coding.quality_scale import error_of
+from gvpipe.container.bitstream import pack_payload, unpack_payload
+from gvpipe.foundation.errors import FormatError, SettingError
+from gvpipe.metrics.vertex_errors import measure_errors
+from gvpipe.model.sequence import MeshSequence
+
+PROJECT = Path(__file__).parents[2] / "baselines" / "pyproject.toml"
+ENTRIES = tomllib.loads(PROJECT.read_text("utf-8"))["project"]["entry-points"]["gvpipe.codecs"]
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    *((name, {}) for name in ENTRIES),
+    *(("dynapack", {"predictor": predictor}) for predictor in ("replica", "space", "time")),
+    ("kglpc", {"taps": 0}),
+    ("cpca", {"clusters": 3, "components": 0}),
+]
+each_variant = pytest.mark.parametrize(
+    ("name", "settings"), [pytest.param(n, s, id=" ".join([n, *map(str, s.values())])) for n, s in VARIANTS]
+)
+AWKWARD = awkward()
+AWKWARD_CASES = [  # each codec meets every third input; the others are left to the slow run
+    pytest.param(codec, name, id=f"{codec}-{name}", marks=[] if (i + j) % 3 == 0 else pytest.mark.slow)
+    for i, codec in enumerate(ENTRIES)
+    for j, name in enumerate(AWKWARD)
+]
+
+
+def load(name: str) -> type[Baseline]:
+    module, _, kind = ENTRIES[name].partition(":")
+    found: type[Baseline] = getattr(import_module(module), kind)
+    return found
+
+
+@cache
+def encoded(name: str) -> tuple[MeshSequence, Encoded]:
+    sequence = waving(10, 20)
+    return sequence, load(name)().encode(sequence)
+
+
+def positions(codec: type[Baseline], made: Encoded) -> np.ndarray:
+    """Decoded from bytes, ``(F, V, 3)``, in the order of the sequence's vertices."""
+    bitstream, _ = unpack_payload(pack_payload(made.bitstream, {}))
+    decoded = codec.reader(bitstream).read(0, bitstream.n_frames)
+    result = np.empty_like(decoded)
+    result[:, made.permutation] = decoded
+    return result
+
+
+def _part(frames: np.ndarray, start: int, stop: int) -> np.ndarray:
+    return frames[start:stop]
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_entry_points_name_codecs(name: str) -> None:
+    codec = load(name)
+    assert (codec.id, codec.version) == (name, 1)
+    assert codec.from_texts({"quality": "30", "reorder": "true"}) == codec(quality=30.0, reorder=True)
+    for wrong in ({"quality": 101}, {"segment": 0}):
+        with pytest.raises(SettingError, match=next(iter(wrong))):
+            codec(**wrong)  # type: ignore[arg-type]
+
+
+@each_variant
+def test_the_error_is_the_one_that_quality_asks_for(name: str, settings: dict[str, Any]) -> None:
+    sequence, codec = waving(10, 20), load(name)
+    sizes = []
+    for quality in (50.0, 75.0):
+        made = codec(quality=quality, **settings).encode(sequence)
+        assert same_triangles(made.permutation[codec.reader(made.bitstream).faces], sequence.faces)
+        frames = positions(codec, made)
+        kg = measure_errors(sequence, partial(_part, frames)).kg
+        assert kg is not None and 0.7 * error_of(quality) < kg < 1.1 * error_of(quality)
+        sizes.append(len(made.bitstream.sections["frames.0"]))
+    assert sizes[0] < sizes[1]
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_segments_decode_alone_and_order_is_kept(name: str) -> None:
+    sequence, codec = waving(8, 15), load(name)
+    made = codec(segment=6).encode(sequence)
+    assert np.array_equal(made.permutation, np.arange(sequence.n_vertices))
+    whole = codec.reader(made.bitstream).read(0, 15)
+    own = {k: v for k, v in made.bitstream.sections.items() if k in ("mesh", "order", "frames.1")}
+    alone = codec.reader(dataclasses.replace(made.bitstream, sections=own))
+    assert np.array_equal(alone.read(6, 9), whole[6:9])
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_changed_and_cut_bytes_are_refused_or_decode(name: str) -> None:
+    """No change of a section's bytes leads to anything but frames or `FormatError`."""
+    _, made = encoded(name)
+    data, refused = made.bitstream.sections["frames.0"], 0
+    rng = np.random.default_rng(7)
+    for at in [*range(0, 40, 3), *rng.integers(0, len(data), 30).tolist()]:
+        for changed in (data[:at], data[:at] + bytes([data[at] ^ 0x41]) + data[at + 1 :]):
+            sections = {**made.bitstream.sections, "frames.0": changed}
+            try:
+                frames = load(name).reader(dataclasses.replace(made.bitstream, sections=sections)).read(0, 20)
+                assert np.isfinite(frames).all()
+            except FormatError:
+                refused += 1
+    assert refused >= 44  # every cut one at least
+
+
+@pytest.mark.parametrize(("codec", "name"), AWKWARD_CASES)
+def test_awkward_inputs(codec: str, name: str) -> None:
+    sequence = AWKWARD[name]
+    frames = positions(load(codec), load(codec)(quality=90).encode(sequence))
+    given = np.asarray(sequence.positions[:], np.float64)
+    extent = float(np.ptp(given, axis=(0, 1)).max())
+    assert np.abs(frames - given).max() <= 0.02 * extent + 1e-6 * np.abs(given).max()
