@@ -43,8 +43,9 @@ def make_robot() -> Animation:
 
     def add(part: tuple[str, tuple[float, ...], tuple[float, ...]], turn: Floats, place: Floats) -> None:
         nonlocal n
-        points, triangles = box(*part[1]) if part[0] == "box" else cylinder(*part[1])
-        pieces.append(np.einsum("fij,vj->fvi", turn, points + part[2]) + place[:, None])
+        kind, size, middle = part
+        points, triangles = box(size[0], size[1], size[2]) if kind == "box" else cylinder(size[0], size[1])
+        pieces.append(np.einsum("fij,vj->fvi", turn, points + middle) + place[:, None])
         faces.append(triangles + n)
         n += len(points)
 

@@ -14,6 +14,7 @@ from gvpipe.mesh.lattice import Lattice
 
 AFFINE_BITS = 12  # along the longest side, the paper's
 BITS = 8, 16  # along the longest side, that are chosen unasked, about
+WELD_BITS = 7  # along the longest side, of the lattice whose step limits that of welding
 BASE_STEP = 1.3  # times step / sqrt(frames): measured, docs/decisions/0068-base-lattice-follows-the-target-error.md
 FINER = 2**0.25  # times, a lattice that does not keep enough points distinct
 DISTINCT = 0.85  # part of the positions in a base frame that its lattice must keep distinct; the others give way
@@ -25,13 +26,13 @@ def base_step(step: float, n_frames: int) -> float:
 
 
 def weld_step(settings: Settings, first: Float32, step: float) -> float:
-    """The step by which vertices are one point, model units: a quantisation step, but no more than a base lattice.
+    """The step by which vertices are one point, model units: a quantisation step, but no more than a coarse lattice.
 
     A mesh whose neighbours merge costs more, not less. As published, the target error touches no point.
     """
     if not settings.is_blended:
         return Lattice.over(first, AFFINE_BITS).step
-    return min(step, Lattice.over(first, BITS[0]).step)
+    return min(step, Lattice.over(first, WELD_BITS).step)
 
 
 def choose_lattice(settings: Settings, first: Float32, step: float) -> Lattice:
