@@ -124,7 +124,7 @@ def change(row: Row, released: Sequence[Row]) -> float | None:
     before = merged(released, []).get((row["sequence"], row["codec"]))
     if before is None or not before["bytes"]:
         return None
-    return float(row["bytes"] / before["bytes"] - 1) if row["bytes"] else float("inf")
+    return round(row["bytes"] / before["bytes"] - 1, 9) if row["bytes"] else float("inf")
 
 
 def find_grown(rows: Sequence[Row], released: Sequence[Row]) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
-from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Float64, Int32, Int64
 
 PAIRS = 1 << 10  # whose errors are worked out at a time
 
@@ -68,7 +68,7 @@ def _added_errors(problem: Problem, trial: Trial, pairs: Int64) -> Float64:
     return errors
 
 
-def _join(weights: Weights, into: Int64) -> Weights:
+def _join(weights: Weights, into: Int32) -> Weights:
     """Weights where each cluster has become the one that ``into (K,)`` names; those of equal clusters are added."""
     parts = weights.weights.copy()
     clusters = np.where(parts > 0, into[weights.clusters], 0).astype(np.int32)
