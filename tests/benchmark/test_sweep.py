@@ -51,7 +51,7 @@ def test_a_reader_that_disagrees_with_itself_is_found(sheet: Path, tmp_path: Pat
     gvpipe.encode(sequence, tmp_path / "a.mp4", "pca")
     whole = gvpipe.decode(tmp_path / "a.mp4")
     shifted = dataclasses.replace(whole, positions=whole.positions[:] + 1)
-    monkeypatch.setattr("gvpipe.api.decode", lambda path: shifted)
+    monkeypatch.setattr("gvpipe.api.decode", lambda path, **_: shifted)
     with pytest.raises(GvpipeError, match="alone is not"):
         sweep._verify(sequence, tmp_path / "a.mp4")
 
