@@ -134,6 +134,7 @@ def test_it_reads_back(written: tuple[Path, Any, float]) -> None:
 
 ENGINES = {"three.js": ("run_skin.mjs", THREE), "Babylon.js": ("run_babylon.mjs", BABYLON)}
 each_engine = pytest.mark.parametrize("engine", ENGINES)
+three_quickly = pytest.mark.parametrize("engine", ["three.js", pytest.param("Babylon.js", marks=pytest.mark.slow)])  # takes 2 s
 
 
 def shown_by(engine: str, path: Path, times: list[float]) -> Any:
@@ -153,7 +154,7 @@ def test_engines_show_the_same(engine: str, written: tuple[Path, Any, float]) ->
     assert farthest(shown_by(engine, path, [k / fps for k in shown]), frames[shown]) < 1e-5
 
 
-@each_engine
+@three_quickly
 @pytest.mark.parametrize("has_skin", [True, False])
 def test_compressed_files_show_the_same(has_skin: bool, engine: str, tmp_path: Path) -> None:
     """In fewer bytes, and in another order of vertices; a skeleton and morph targets alike."""
@@ -319,7 +320,7 @@ def _saved(sequence: MeshSequence, folder: Path) -> Path:
     return folder / "in.npz"
 
 
-@each_engine
+@three_quickly
 @pytest.mark.parametrize("compress", ["none", "meshopt"])
 def test_engines_show_corrective_shapes(compress: str, engine: str, tmp_path: Path) -> None:
     sequence = wrinkled()
@@ -331,7 +332,7 @@ def test_engines_show_corrective_shapes(compress: str, engine: str, tmp_path: Pa
     assert farthest(found, skin.read(0, 24)[shown][:, sources]) < max(2e-5, 0.1 * skin.error)
 
 
-@each_engine
+@three_quickly
 @pytest.mark.parametrize("correctives", [0, 8])
 def test_draco_files_show_the_same(correctives: int, engine: str, tmp_path: Path) -> None:
     """In Draco's order of vertices; where shapes need it, in the order that they have."""

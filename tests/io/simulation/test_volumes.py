@@ -156,7 +156,9 @@ def test_other_formats_say_what_they_leave_out(tmp_path: Path, run: Any) -> None
     assert replace(part, volume=given.volume).reordered(np.arange(given.n_vertices), given.faces).volume is None
 
 
-@pytest.mark.parametrize("codec", ["mcgv", "pca", "laplacian", "pdct"])
+@pytest.mark.parametrize(
+    "codec", ["mcgv", "pca", *(pytest.param(name, marks=pytest.mark.slow) for name in ("laplacian", "pdct"))]
+)
 def test_every_codec_and_layout_carries_volumes(tmp_path: Path, codec: str) -> None:
     given = gvpipe.read(write_block(tmp_path / "in.pvd"), volume=True)
     gvpipe.encode(given, tmp_path / "a.mp4", codec, max_error="0.1%", reorder=True)
