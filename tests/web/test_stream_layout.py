@@ -131,7 +131,7 @@ def test_motion_without_pictures_comes_in_parts(module: Callable[..., Any], tmp_
 
 def test_trajectory_images_come_in_parts(module: Callable[..., Any], tmp_path: Path) -> None:
     path = tmp_path / "images.mp4"
-    gvpipe.encode(waving(70, 200), path, preset="ultrafast", stream=True, transform="klt", segment=20, quality=95)
+    gvpipe.encode(waving(90, 200), path, preset="ultrafast", stream=True, transform="klt", segment=20, quality=98)
     assert path.stat().st_size > 2 << 16
     with gvpipe.open(path) as video, serving(path.read_bytes()) as (url, served):
         found = module(JUMP, url, 170)

@@ -34,7 +34,7 @@ export async function show(scene: Scene, camera: PerspectiveCamera): Promise<Geo
   await mesh.showField("height", { colormap: "rainbow" });
   await mesh.showField("height", { scale: "log" });
   const isMoved: boolean = await mesh.setWarp("displacement", 10);
-  const picked: number | undefined = mesh.pick(new Ray(camera.position, mesh.position))?.vertex;
+  const picked: number | null | undefined = mesh.pick(new Ray(camera.position, mesh.position))?.vertex;
   mesh.setFlatShading(isMoved && picked === 0);
   await mesh.play();
   mesh.update(range?.[1] ?? 0.04);
@@ -46,7 +46,7 @@ export function control(): number {
   const same: GeometryVideoElement = element;
   same.addEventListener("frame", (event) => event.detail.toFixed(0));
   same.addEventListener("click", (event) => event.clientX);
-  same.addEventListener("probe", ({ detail }) => detail.value?.toFixed(detail.vertex));
+  same.addEventListener("probe", ({ detail }) => detail.value?.toFixed(detail.vertex ?? detail.frame));
   same.scale = same.warp || same.camera?.[0] ? "log" : "linear";
   same.playbackRate = 2;
   // @ts-expect-error it follows from the file
