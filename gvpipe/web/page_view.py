@@ -185,7 +185,7 @@ def view_of_shots(
     shots: Sequence[MeshSequence], field: str | None, field_range: Range, warp: str | None, **options: Any
 ) -> PageView:
     """How the page opens: what is asked of fields is looked up in the shots that have them, and colours span all of these."""
-    having = [shot for shot in shots if field in shot.fields] or list(shots[:1])
+    having = [shot for shot in shots if field in shot.fields] or [shots[0]]
     moving = next((shot for shot in shots if warp is not None and warp.partition(":")[0] in shot.fields), having[0])
     warped = page_view(moving, warp=warp).warp
     views = [page_view(shot, field=field, field_range=field_range, **options) for shot in having]

@@ -16,6 +16,7 @@ from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.notebook import prepared
 from gvpipe.notebook.pick import read_pick
 from gvpipe.notebook.prepared import prepare
+from gvpipe.web.page_view import view_of_shots
 
 
 def test_a_video_is_shown_as_it_is(video: Path) -> None:
@@ -132,3 +133,11 @@ def test_a_capture_is_encoded_and_picked_by_its_shots(tmp_path: Path) -> None:
     for opened in (tmp_path / "splash.mp4", gvpipe.open_capture(tmp_path / "splash.mp4")):
         assert prepare(opened, "0.5%").data() == shown.data() and not prepare(opened, "0.5%").note
     assert '<td style="text-align:left">8</td>' in gvpipe.open_capture(tmp_path / "splash.mp4")._repr_html_()
+
+
+def test_how_a_capture_opens_is_looked_up_in_its_shots() -> None:
+    capture = gvpipe.read_capture(SAMPLES / "splash")
+    view = view_of_shots(prepare(capture, "0.5%").shots, None, None, None, speed=2.0)
+    assert view.speed == 2.0 and view.field is None
+    with pytest.raises(InputError, match="field 'stress' asked for; there are none"):
+        view_of_shots(prepare(capture, "0.5%").shots, "stress", None, None)
