@@ -9,8 +9,8 @@ import json
 import math
 import sys
 
-import bpy
-from mathutils import Vector
+import bpy  # type: ignore[import-not-found]
+from mathutils import Vector  # type: ignore[import-not-found]
 
 
 def main() -> None:
