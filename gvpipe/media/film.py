@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import UInt8
-from gvpipe.media.video import PROFILES, PlainPackets, VideoWriter, check_x264, has_x264, x264_options
+from gvpipe.media.video import PROFILES, PlainPackets, VideoWriter, check_x264, has_x264, without_avx512, x264_options
 
 FILM = {"preset": "medium", "crf": "20"}  # x264 codes for the eye
 JPEG_STEP = 16  # levels: 2 kB for a poster
@@ -28,7 +28,9 @@ def write_film(path: Path, pictures: Iterable[UInt8], fps: float) -> None:
     check_x264()
     rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
     with av.open(os.fspath(path), "w", format="mp4", options={"fflags": "+bitexact", "movflags": "+faststart"}) as container:
-        stream = container.add_stream("libx264", rate, options={**FILM, "x264-params": "threads=1:log-level=0"})
+        stream = container.add_stream(
+            "libx264", rate, options={**FILM, "x264-params": f"threads=1:log-level=0{without_avx512()}"}
+        )
         stream.pix_fmt = "yuv420p"
         context = stream.codec_context
         context.time_base = 1 / rate

@@ -23,7 +23,7 @@ import numpy as np
 from gvpipe.foundation.arrays import UInt8
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.foundation.picture_limits import IN_MEMORY
-from gvpipe.media.video import PlainPackets
+from gvpipe.media.video import PlainPackets, without_avx512
 
 GROUP = 32  # pictures
 DEFAULT_QUALITY = 75
@@ -133,6 +133,8 @@ def encode_pictures(
     encoder, (width, height) = ENCODERS[codec], size
     rate = Fraction(fps).limit_denominator(1001) or Fraction(1, 1001)
     options = {key: value.format(crf=f"{encoder.crf(quality):g}") for key, value in encoder.options.items()}
+    if codec == "h264":
+        options["x264-params"] += without_avx512()
     if codec == "av1":
         options["crf"] = str(round(encoder.crf(quality)))  # SVT-AV1 takes whole numbers
     file: IO[bytes]

@@ -15,6 +15,7 @@ is the GPL: then H.264 is read, and not written.
 
 from __future__ import annotations
 
+import functools
 import io
 import tempfile
 from bisect import bisect_right
@@ -42,6 +43,7 @@ B_FRAMES = 3  # between two others
 SPARE_PIXELS = 1 << 16  # for margins that FFmpeg adds
 MAX_SIDE = 16384  # pixels, of a picture that is read
 SECONDS_PER_PIXEL = 3e-9  # of H.264 without residuals, the cheapest
+AVX2 = 11  # OpenCV's number
 QP_RANGE = (1, 51)  # 0 would be lossless, which is another H.264 profile that browsers do not read
 # measured (docs/decisions/0076-x264-has-three-b-frames-throughout.md): psycho-visual choices and the deblocking
 # filter only cost here, since blocks are separate charts; a pyramid of three B-frames (`B_FRAMES`) throughout beats what x264
@@ -442,6 +444,17 @@ def check_x264() -> None:
             "PyAV was built with an FFmpeg that has no libx264, which writes H.264; --set image=jpeg needs none, nor do "
             "--codec pca, laplacian and pdct, or install PyAV from its wheel"
         )
+
+
+@functools.cache
+def without_avx512() -> str:
+    """What to add to options of x264 that looks ahead, as it does where a rate factor is asked for.
+
+    With AVX-512 its macroblock tree reads memory that nothing was written to, so that two encodes of the same pictures differ.
+    """
+    import cv2
+
+    return ":asm=AVX2" if cv2.checkHardwareSupport(AVX2) else ""
 
 
 def x264_options(quality: int, gop: int, preset: str, b_frames: int = B_FRAMES) -> dict[str, str]:
