@@ -4,6 +4,7 @@ import "@babylonjs/loaders/glTF";
 import * as THREE from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
+import { useMeshopt } from "./babylon_meshopt.mjs";
 
 const FRAMES_A_SECOND = 60; // in which Babylon.js counts
 
@@ -26,14 +27,7 @@ async function byThree(canvas, bytes, seconds, { eye, target, fov }) {
 }
 
 async function byBabylon(canvas, bytes, seconds, { eye, target, fov }) {
-  BABYLON.MeshoptCompression._Default = { // else it loads its decoder from a network
-    decodeGltfBufferAsync: async (source, count, stride, mode, filter) => {
-      await MeshoptDecoder.ready;
-      const decoded = new Uint8Array(count * stride);
-      MeshoptDecoder.decodeGltfBuffer(decoded, count, stride, source, mode, filter);
-      return decoded;
-    },
-  };
+  useMeshopt(BABYLON, MeshoptDecoder);
   const engine = new BABYLON.Engine(canvas, true, { preserveDrawingBuffer: true });
   const scene = new BABYLON.Scene(engine);
   scene.useRightHandedSystem = true;

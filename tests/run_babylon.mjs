@@ -2,6 +2,7 @@
 // Prints JSON: for each time the positions of all vertices of all meshes, in the file's order, in the world.
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
+import { useMeshopt } from "./babylon_meshopt.mjs";
 
 const [folder, file, ...times] = process.argv.slice(2);
 const load = (name) => import(pathToFileURL(`${folder}/${name}`).href);
@@ -11,14 +12,7 @@ await load("@babylonjs/loaders/glTF/index.js");
 const { NullEngine, Scene, LoadAssetContainerAsync, FreeCamera, Vector3 } = BABYLON;
 BABYLON.Logger.LogLevels = BABYLON.Logger.NoneLogLevel; // its greeting goes to standard output
 const { MeshoptDecoder } = await load("three/examples/jsm/libs/meshopt_decoder.module.js");
-BABYLON.MeshoptCompression._Default = { // else it loads its decoder from a page's network
-  decodeGltfBufferAsync: async (source, count, stride, mode, filter) => {
-    await MeshoptDecoder.ready;
-    const target = new Uint8Array(count * stride);
-    MeshoptDecoder.decodeGltfBuffer(target, count, stride, source, mode, filter);
-    return target;
-  },
-};
+useMeshopt(BABYLON, MeshoptDecoder);
 const { dracoModule, dracoBytes } = await import("./three_draco.mjs");
 const jsModule = () => dracoModule(`${folder}/three`)({ wasmBinary: dracoBytes(`${folder}/three`) });
 BABYLON.DracoDecoder._Default = new BABYLON.DracoDecoder({ numWorkers: 0, jsModule });

@@ -121,7 +121,7 @@ def test_promise(variant: str, promise: Promise, subjects: Callable[[str], Subje
 
 @pytest.mark.parametrize(("codec", "settings", "reorder", "name"), AWKWARD_CASES)
 def test_awkward_inputs(codec: str, settings: dict[str, Any], reorder: bool, name: str, tmp_path: Path) -> None:
-    awkward_input(Subject(make(codec, **settings), tmp_path), name, reorder)
+    awkward_input(Subject(make(codec, **settings), tmp_path), AWKWARD[name], reorder)
 
 
 @each_file

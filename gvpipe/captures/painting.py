@@ -15,13 +15,12 @@ from gvpipe.asset.material import Material, with_uv
 from gvpipe.asset.moving import png_of
 from gvpipe.asset.part import Part
 from gvpipe.asset.placement import from_upper_left
-from gvpipe.following import Run
+from gvpipe.captures.followed_frames import FollowedFrames
 from gvpipe.following.atlas import FILLED, Atlas, make_atlas
-from gvpipe.following.places import OwnMesh
+from gvpipe.following.surface import vertex_normals
 from gvpipe.following.texels import Texels
-from gvpipe.foundation.arrays import Float64, UInt8
+from gvpipe.foundation.arrays import UInt8
 from gvpipe.foundation.errors import InputError
-from gvpipe.model.capture import Capture
 from gvpipe.model.moving_texture import with_pictures
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.surface_colours import SurfaceColours
@@ -65,32 +64,29 @@ def picture_size(sequence: MeshSequence) -> tuple[int, int]:
     return max((size for size in sizes if size), default=(0, 0))
 
 
-def with_looks(sequence: MeshSequence, frames: Capture, run: Run) -> MeshSequence:
+def with_looks(sequence: MeshSequence, followed: FollowedFrames) -> MeshSequence:
     """A followed run with the look of its frames: a material, and a texture that moves as their colours do.
 
     Args:
         sequence: the run's, positions relative to its origin.
-        frames: of the run, as they came.
-        run: the key mesh at each of the frames.
+        followed: its frames.
 
     Raises:
         InputError: xatlas hung or died.
     """
-    assert run.key is not None
-    key = frames.frame(run.key - run.start)
+    key = followed.frames.frame(followed.key)
     used = _used_materials(key)
     if not used and not has_paint(key):
         return sequence
     material = with_uv((used[0],), ())[0] if used else Material(name=IMAGE, double_sided=True)
-    part = Part("", (0, sequence.n_vertices), (0, len(run.faces)), material=0)
+    part = Part("", (0, sequence.n_vertices), (0, len(sequence.faces)), material=0)
     if not has_paint(key):
         return replace(sequence, materials=(material,), parts=(part,))
-    at_key = np.asarray(run.positions[run.key - run.start : run.key - run.start + 1], np.float64)[0]
-    atlas = make_atlas(at_key, run.faces, _n_texels(key))
+    atlas = make_atlas(followed.followed(followed.key), followed.faces, _n_texels(key))
     uv = Attribute(atlas.uv.astype(np.float32), "corner", "uv", atlas.corners.ravel())
     opaque = replace(material, base_color=(1.0, 1.0, 1.0, 1.0), alpha_mode="opaque")
     bare = replace(sequence, attributes={**sequence.attributes, UV: uv}, materials=(opaque,), parts=(part,))
-    return with_pictures(bare, FollowedPictures(frames, sequence.origin, run, atlas), IMAGE)
+    return with_pictures(bare, FollowedPictures(followed, atlas), IMAGE)
 
 
 def _used_materials(frame: MeshSequence) -> list[Material]:
@@ -122,17 +118,13 @@ class FollowedPictures:
     """A picture of a key mesh's atlas for each frame (`gvpipe.asset.moving.Pictures`), painted when it is asked for.
 
     Args:
-        frames: as they came.
-        origin: ``(3,)`` what the run's positions are relative to, model units.
-        run: the key mesh at each of the frames.
+        followed: frames as they came, and the key mesh at each of them.
         atlas: of the key mesh.
     """
 
-    def __init__(self, frames: Capture, origin: Float64, run: Run, atlas: Atlas) -> None:
-        assert run.key is not None
-        self._frames, self._origin, self._run, self._atlas = frames, origin, run, atlas
-        at = run.key - run.start
-        self._texels = Texels(atlas, np.asarray(run.positions[at : at + 1], np.float64)[0], run.faces)
+    def __init__(self, followed: FollowedFrames, atlas: Atlas) -> None:
+        self._followed, self._atlas = followed, atlas
+        self._texels = Texels(atlas, followed.followed(followed.key), followed.faces)
         self._last: tuple[int, UInt8] | None = None
 
     @property
@@ -141,7 +133,7 @@ class FollowedPictures:
         return self._atlas.width, self._atlas.height
 
     def __len__(self) -> int:
-        return len(self._frames)
+        return len(self._followed)
 
     def file(self, frame: int) -> tuple[str, bytes]:
         """As of `Pictures`: a PNG."""
@@ -155,16 +147,16 @@ class FollowedPictures:
         return last[1]
 
     def _paint(self, frame: int) -> UInt8:
-        own = self._frames.frame(frame)
-        mesh = OwnMesh(own.read_absolute(0, 1)[0] - self._origin, own.faces)
-        positions = np.asarray(self._run.positions[frame : frame + 1], np.float64)[0]
+        own, mesh = self._followed.own(frame)
+        positions = self._followed.followed(frame)
+        normals = vertex_normals(positions, self._followed.faces)
         colours = SurfaceColours(own)
         if colours.notes:
             raise InputError(f"{own.name}: frame {frame} of a run that is followed: {colours.notes[0]}; {KEPT}")
         result = np.full((self._atlas.height * self._atlas.width, 3), UNSEEN, np.uint8)
 
         def fill(span: slice) -> None:
-            places = mesh.places(*self._texels.at(positions, span))
+            places = mesh.places(*self._texels.at(positions, normals, span))
             result[self._texels.where[span]] = colours.at(places.triangles.astype(np.int32), places.weights)
 
         spans = [slice(at, at + BLOCK) for at in range(0, len(self._texels), BLOCK)]

@@ -8,26 +8,20 @@ from typing import Any
 import numpy as np
 
 from gvpipe.asset.field import Field
-from gvpipe.following import Run
-from gvpipe.following.closest import triangle_normals
-from gvpipe.following.places import OwnMesh, Places
+from gvpipe.captures.followed_frames import FollowedFrames
+from gvpipe.following.places import Places
 from gvpipe.following.surface import vertex_normals
-from gvpipe.foundation.arrays import Array, Float64
-from gvpipe.model.capture import Capture
+from gvpipe.foundation.arrays import Array
+from gvpipe.metrics.surface_samples import triangle_normals
 from gvpipe.model.sequence import MeshSequence
 
 
-def sampled_fields(frames: Capture, origin: Float64, run: Run) -> dict[str, Field]:
-    """Fields of a followed run by name: those that all of its frames have, with the same domain and components.
-
-    Args:
-        frames: of the run, as they came.
-        origin: ``(3,)`` what the run's positions are relative to, model units.
-        run: the key mesh at each of the frames.
-    """
-    first = frames.shots[0].fields
-    kept = [name for name, field in first.items() if all(_is_alike(shot.fields.get(name), field) for shot in frames.shots)]
-    places = {domain: _FramePlaces(frames, origin, run, domain) for domain in ("vertex", "triangle")}
+def sampled_fields(followed: FollowedFrames) -> dict[str, Field]:
+    """Fields of a followed run by name: those that all of its frames have, with the same domain and components."""
+    shots = followed.frames.shots
+    first = shots[0].fields
+    kept = [name for name, field in first.items() if all(_is_alike(shot.fields.get(name), field) for shot in shots)]
+    places = {domain: _FramePlaces(followed, domain) for domain in ("vertex", "triangle")}
     return {name: _sampled(name, first[name], places[first[name].domain]) for name in kept}
 
 
@@ -42,25 +36,25 @@ def _sampled(name: str, first: Field, places: _FramePlaces) -> Field:
 class _FramePlaces:
     """Where a run's vertices, or the middles of its triangles, lie on the frames' own meshes; the last frame's are kept."""
 
-    def __init__(self, frames: Capture, origin: Float64, run: Run, domain: str) -> None:
-        self._frames, self._origin, self._run, self._domain = frames, origin, run, domain
+    def __init__(self, followed: FollowedFrames, domain: str) -> None:
+        self._followed, self._domain = followed, domain
         self._last: tuple[int, MeshSequence, Places] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
         """Frames, and rows of each."""
-        return len(self._frames), len(self._run.faces) if self._domain == "triangle" else int(self._run.positions.shape[1])
+        followed = self._followed
+        return len(followed), len(followed.faces) if self._domain == "triangle" else followed.n_vertices
 
     def of(self, frame: int) -> tuple[MeshSequence, Places]:
         """A frame as it came, and the places on it."""
         last = self._last
         if last is None or last[0] != frame:
-            own = self._frames.frame(frame)
-            mesh = OwnMesh(own.read_absolute(0, 1)[0] - self._origin, own.faces)
-            points = np.asarray(self._run.positions[frame : frame + 1], np.float64)[0]
-            normals = vertex_normals(points, self._run.faces)
+            own, mesh = self._followed.own(frame)
+            points, faces = self._followed.followed(frame), self._followed.faces
+            normals = vertex_normals(points, faces)
             if self._domain == "triangle":
-                corners = points[self._run.faces]
+                corners = points[faces]
                 points, normals = corners.mean(axis=1), triangle_normals(corners)
             self._last = last = frame, own, mesh.places(points, normals)
         return last[1], last[2]

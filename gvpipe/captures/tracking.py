@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
 
+from gvpipe.captures.followed_frames import FollowedFrames
 from gvpipe.captures.painting import left_of_looks, paint_names, picture_size, with_looks
 from gvpipe.captures.sampled_fields import sampled_fields
 from gvpipe.following import Run, follow
@@ -63,7 +64,10 @@ def is_tracked_by_default(capture: Capture) -> bool:
     Fields would be sampled, which is not what who measures expects.
     """
     alone = sum(length == 1 for length in capture.lengths)
-    return len(capture) > 2 and 2 * alone > len(capture) and not what_is_lost(capture.shots[0]) and not capture.shots[0].fields
+    if len(capture) <= 2 or 2 * alone <= len(capture):
+        return False
+    first = capture.shots[0]
+    return not what_is_lost(first) and not first.fields
 
 
 def what_is_lost(shot: MeshSequence) -> list[str]:
@@ -122,9 +126,10 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
             f"{alone} are as they came (--track off: all)"
         )
         notes += [f"colours of each frame become textures that move, of up to {size[0]}x{size[1]} texels"] if size[0] else []
-        lost = what_is_lost(capture.shots[0])
+        first = capture.shots[0]
+        lost = what_is_lost(first)
         kept = [shot.fields for shot, key in zip(shots, keys, strict=True) if key is not None]
-        lost += [name for name in capture.shots[0].fields if not all(name in fields for fields in kept)]
+        lost += [name for name in first.fields if not all(name in fields for fields in kept)]
         notes += [f"{SURFACE_ALONE}; left out: {', '.join(lost)}"] if lost else []
     found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
     return Tracked(found, tuple(keys), tuple(notes))
@@ -159,7 +164,7 @@ def _shot(capture: Capture, start: int, run: Run, origin: Float64) -> MeshSequen
     if metadata.times:
         times = tuple(float(capture.frame(start + k).times[0]) for k in range(run.start, run.stop))
         metadata = replace(metadata, times=times)
-    frames = capture.part(start + run.start, start + run.stop)
-    fields = sampled_fields(frames, origin, run)
+    followed = FollowedFrames(capture.part(start + run.start, start + run.stop), origin, run)
+    fields = sampled_fields(followed)
     bare = MeshSequence(run.positions, run.faces, capture.fps, {}, capture.name, origin, fields=fields, metadata=metadata)
-    return with_looks(bare, frames, run)
+    return with_looks(bare, followed)

@@ -10,10 +10,9 @@ frame, in the one before and in the one after. With S the neighbours' average un
 - the neighbours one by one.
 
 Two filters learn the weights from the row's own values, by the recursion of recursive least squares with a prior (a Kalman
-filter of constant weights). The first one learns fast, the second one slowly: by how
-much is one of `TUNINGS`. Their guesses are averaged, each weighed by the
-inverse square of its recent squared errors. The weights of the first five signals, and the errors, start from what the nearest
-neighbours came to.
+filter of constant weights). The first one learns fast, the second one slowly: how much so is one of `TUNINGS`. Their guesses
+are averaged, each weighed by the inverse square of its recent squared errors. The weights of the first five signals, and the
+errors, start from what the nearest neighbours came to.
 
 Values are in steps. The step is twice the bound, and a residual is rounded to a whole step, so that no value misses the bound.
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.metrics.surface_samples import triangle_normals
 from gvpipe.metrics.triangle_tree import curve_order
 from gvpipe.runtime.ahead import run_ahead
 
@@ -84,14 +85,6 @@ class ClosestPoints:
         found = np.einsum("pk,pkd->pd", weights, self.positions[self.faces[triangles]])
         found[missed], squared[missed] = np.nan, np.inf
         return Hits(triangles, weights, found, np.sqrt(squared))
-
-
-def triangle_normals(corners: Float64) -> Float64:
-    """Normals ``(T, 3)`` of triangles ``(T, 3 corners, 3)``: of length 1, or 0 for those without area."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: Float64 = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
-    return unit
 
 
 def _parts(n: int) -> list[slice]:

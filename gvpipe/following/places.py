@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.following.closest import ClosestPoints
-from gvpipe.following.surface import vertex_normals
 from gvpipe.foundation.arrays import Array, Float64, Floats, Int32, Int64
 
 AGREEMENT = 0.0  # least cosine between the normals of a point and its place, where there is such a place
@@ -65,16 +64,3 @@ class OwnMesh:
         for given, other in zip(found, closest, strict=True):
             given[far[takes]] = other[takes]
         return Places(found.triangles, found.weights, found.distances)
-
-
-def places_on(positions: Floats, faces: Int32, points: Floats, triangles: Int32) -> Places:
-    """The closest points of a followed mesh's vertices on a frame's own mesh, as `OwnMesh.places` says.
-
-    Args:
-        positions: ``(V, 3)`` of the followed mesh at this frame, model units.
-        faces: ``(T, 3)`` of the followed mesh.
-        points: ``(N, 3)`` of the frame.
-        triangles: ``(M, 3)`` of the frame, M > 0.
-    """
-    vertices = np.asarray(positions, dtype=np.float64)
-    return OwnMesh(points, triangles).places(vertices, vertex_normals(vertices, faces))

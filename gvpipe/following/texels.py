@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.following.atlas import Atlas
-from gvpipe.following.surface import Samples, vertex_normals
+from gvpipe.following.surface import Samples
 from gvpipe.foundation.arrays import Float64, Int32, Int64
 from gvpipe.metrics.triangle_tree import curve_order
 
@@ -38,8 +38,7 @@ class Texels:
     def __len__(self) -> int:
         return len(self.where)
 
-    def at(self, positions: Float64, span: slice) -> tuple[Float64, Float64]:
-        """Points and normals ``(P, 3)`` of some texels, where the mesh has ``positions (V, 3)``."""
-        normals = vertex_normals(positions, self._faces)
+    def at(self, positions: Float64, normals: Float64, span: slice) -> tuple[Float64, Float64]:
+        """Points and normals ``(P, 3)`` of some texels, where the mesh has ``positions (V, 3)`` and ``normals (V, 3)``."""
         samples = Samples(self._triangles[span].astype(np.int64), self._weights[span].astype(np.float64))
         return samples.of(positions, self._faces), samples.of(normals, self._faces)

@@ -181,13 +181,13 @@ def segments(subject: Subject) -> None:
 
 @_promise("awkward input", "one vertex, no triangle, loose, tiny, huge and still meshes come back")
 def awkward_inputs(subject: Subject) -> None:
-    for name in awkward():
-        awkward_input(subject, name, reorder=False)
+    for sequence in awkward().values():
+        awkward_input(subject, sequence, reorder=False)
 
 
-def awkward_input(subject: Subject, name: str, reorder: bool) -> None:
+def awkward_input(subject: Subject, sequence: MeshSequence, reorder: bool) -> None:
     """Try one of `awkward`; with ``reorder``, the codec may give back another order of vertices."""
-    sequence = awkward()[name]
+    name = sequence.name
     given: dict[str, Any] = {"reorder": True} if reorder else {}
     decoded = decode(subject.encode(sequence, "awkward", quality=90, **given))
     frames, source = np.asarray(decoded.positions[:], np.float64), np.asarray(sequence.positions[:], np.float64)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gvpipe.errors import InputError
-from gvpipe.following import Run, follow, places_on
+from gvpipe.following import OwnMesh, Run, follow
 from gvpipe.following.deformation import Deformation
-from gvpipe.following.surface import Surface
+from gvpipe.following.surface import Surface, vertex_normals
 from gvpipe.foundation.arrays import Array, Float64, Int32
 from gvpipe.metrics.surface import surface_distances
 
@@ -155,7 +155,7 @@ def test_colours_come_from_the_frame(moving: list[Mesh], followed: list[Run]) ->
     (run,) = followed
     points, faces = moving[3]
     positions = run.positions[3:4][0]
-    places = places_on(positions, run.faces, points, faces)
+    places = OwnMesh(points, faces).places(positions, vertex_normals(positions, run.faces))
     at = places.of_vertices(points, faces)
     np.testing.assert_allclose(np.linalg.norm(at - positions, axis=1), places.distances, atol=1e-12)
     np.testing.assert_allclose(places.of_corners(points[faces].reshape(-1, 3)), at)
