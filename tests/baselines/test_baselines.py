@@ -27,6 +27,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     *((name, {}) for name in ENTRIES),
     *(("dynapack", {"predictor": predictor}) for predictor in ("replica", "space", "time")),
     ("kglpc", {"taps": 0}),
+    ("maverg", {"predictor": "motion"}),
     ("cpca", {"clusters": 3, "components": 0}),
 ]
 each_variant = pytest.mark.parametrize(
