@@ -5,9 +5,9 @@
     python tools/benchmark_tables.py                                             # tables of docs/curves.md
     python tools/benchmark_tables.py plots                                       # and its pictures
 
-A file is ``docs/benchmarks/curves/NAME.json``, of the shape that `gvpipe bench --json` writes, rounded and without sections. Each
-curve has the commit it was measured at. A curve that the file has already is not measured again, so that an interrupted run
-goes on where it was. A codec that cannot code a sequence has no curve: its message is kept under ``refused``.
+A file is ``docs/benchmarks/curves/NAME.json``, of the shape that `gvpipe bench --json` writes, rounded and without sections.
+Each curve has the commit it was measured at. A curve that the file has already is not measured again, so that an interrupted
+run goes on where it was. A codec that cannot code a sequence has no curve: its message is kept under ``refused``.
 """
 
 from __future__ import annotations

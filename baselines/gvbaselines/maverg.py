@@ -13,7 +13,7 @@ by the parallelogram::
     segment = [3 x float64] origin, [float64] step, residuals [integers]: frame by frame, point by point, x y z
 
 Readings: the paper is not at hand; what it does is from its abstract and from Amjoun and Strasser 2008, who compare with
-it. Points are rounded to the lattice before prediction, so that nothing accumulates. Residuals are range coded as in `dynapack`.
+it. Points are rounded to the lattice before prediction, so that nothing accumulates. Residuals are coded as in `dynapack`.
 """
 
 from __future__ import annotations
