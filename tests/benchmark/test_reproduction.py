@@ -78,7 +78,7 @@ def test_claims_are_judged(lab: Lab) -> None:
 
     assert [state(21, AT_MOST), state(19, AT_MOST), state(21, AT_LEAST)] == [HOLDS, FAILS, FAILS]
     assert [state(18, "about"), state(17, "about")] == [HOLDS, FAILS]
-    for name, codec, why in (("dance", "pca", "dance.npz"), ("cow", "famc", "famc is not installed")):
+    for name, codec, why in (("dance", "pca", "dance.npz"), ("cow", "cobra", "cobra is not installed")):
         outcome = judge(Claim("x", "Table 1", "", 1, "", measure=rate(name, codec, "kg", 0.1)), lab)
         assert (outcome.state, outcome.ours) == (NOT_RUN, None) and why in outcome.why
     left_out = Lab(lab.data, QUICK_QUALITIES, lab.curves, skipped=["cow"])
