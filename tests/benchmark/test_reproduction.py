@@ -26,6 +26,7 @@ from gvpipe.benchmark.reproduction.claims import (
     less_rate,
     rate,
 )
+from gvpipe.benchmark.reproduction.hypothetical import hypothetical_points
 from gvpipe.benchmark.reproduction.lab import QUICK_QUALITIES, Lab
 from gvpipe.benchmark.reproduction.reproduce import PAPERS, claims_of, reproduce
 from gvpipe.benchmark.sweep import report_of
@@ -115,3 +116,14 @@ def test_wrong_arguments(run: Run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there are mcgv, pca"):
         reproduce(["famc"], tmp_path)
     assert run("reproduce", "pca", "--data", tmp_path / "none").status == 1
+
+
+def test_the_hypothetical_predictor_takes_fewer_bits(tmp_path: Path) -> None:
+    gvpipe.write(waving(10, 12), tmp_path / "sheet.npz")
+    lab = Lab(tmp_path, (40.0, 80.0))
+    for point, known in zip(
+        hypothetical_points(lab.sequence("sheet"), lab), lab.points("sheet", "pca:predictor=navg"), strict=True
+    ):
+        assert point["kg"] == pytest.approx(known["kg"], rel=0.2)
+        coefficients = known["sections"]["coefficients.0"]
+        assert 0 < point["bpvf"] < 8 * (known["bytes"] - 0.1 * coefficients) / (100 * 12)
