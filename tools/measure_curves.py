@@ -57,9 +57,9 @@ def measure(source: Path, codecs: list[str], again: bool) -> None:
 
 
 def rounded(point: dict[str, Any]) -> dict[str, Any]:
-    """A point's values with `DIGITS` significant digits."""
+    """A point's values with `DIGITS` significant digits, and so many decimals of its rate."""
     return {
-        key: float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+        key: round(value, DIGITS) if key == "bpvf" else float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
         for key, value in point.items()
         if key not in LEFT_OUT
     }
