@@ -23,6 +23,7 @@ from typing import Any
 from gvpipe.benchmark import sweep
 from gvpipe.foundation.atomic import unnamed_path
 from gvpipe.foundation.errors import GvpipeError
+from gvpipe.tasks.executor import WorkerDied
 
 FOLDER = Path(__file__).parents[1] / "docs" / "benchmarks" / "curves"
 QUALITIES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 100.0)
@@ -45,7 +46,10 @@ def measure(source: Path, codecs: list[str], again: bool) -> None:
         try:
             made = sweep.run([str(source)], [codec], QUALITIES)
         except GvpipeError as exc:
-            known = {**known, "curves": curves, "refused": {**known["refused"], codec: str(exc)}}
+            if isinstance(exc.__cause__, WorkerDied):
+                raise
+            message = str(exc).replace(str(source), source.name)
+            known = {**known, "curves": curves, "refused": {**known["refused"], codec: message}}
         else:
             curve = {**dataclasses.asdict(made.curves[0]), "commit": commit()}
             curve["points"] = [rounded(point) for point in curve["points"]]
