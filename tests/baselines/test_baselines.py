@@ -35,12 +35,14 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("maverg", {"predictor": "motion"}),
     ("cpca", {"clusters": 3, "components": 0}),
 ]
+SLOW = pytest.mark.slow
 each_variant = pytest.mark.parametrize(
-    ("name", "settings"), [pytest.param(n, s, id=" ".join([n, *map(str, s.values())])) for n, s in VARIANTS]
+    ("name", "settings"),
+    [pytest.param(n, s, id=" ".join([n, *map(str, s.values())]), marks=SLOW if n == "gv" else []) for n, s in VARIANTS],
 )
 AWKWARD = awkward()
 AWKWARD_CASES = [  # each codec meets every third input; the others are left to the slow run
-    pytest.param(codec, name, id=f"{codec}-{name}", marks=[] if (i + j) % 3 == 0 else pytest.mark.slow)
+    pytest.param(codec, name, id=f"{codec}-{name}", marks=[] if (i + j) % 3 == 0 else SLOW)
     for i, codec in enumerate(name for name in ENTRIES if name != "gv")  # it takes one surface
     for j, name in enumerate(AWKWARD)
 ]
@@ -106,7 +108,7 @@ def test_segments_decode_alone_and_order_is_kept(name: str) -> None:
     assert np.array_equal(alone.read(6, 9), whole[6:9])
 
 
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW if name == "gv" else []) for name in ENTRIES])
 def test_changed_and_cut_bytes_are_refused_or_decode(name: str) -> None:
     """No change of a section's bytes leads to anything but frames or `FormatError`."""
     _, made = encoded(name)
