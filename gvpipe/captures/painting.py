@@ -46,7 +46,14 @@ def left_of_looks(frame: MeshSequence) -> list[str]:
     lost = [role.replace("_", " ") for role in sorted(roles)]
     shown = {each.base_color_texture.image for each in frame.materials if each.base_color_texture is not None}
     lost += ["pictures that cannot be decoded"] if any(frame.images[number].size is None for number in shown) else []
-    return lost + (["alpha"] if any(each.alpha_mode != "opaque" for each in frame.materials) else [])
+    lost += ["alpha"] if any(each.alpha_mode != "opaque" for each in frame.materials) else []
+    return lost + (["materials but the first"] if len({_but_colour(each) for each in used_materials(frame)}) > 1 else [])
+
+
+def _but_colour(material: Material) -> Material:
+    """What of a material is one for all of a followed mesh."""
+    bare = with_uv((material,), ())[0]
+    return replace(bare, name="", base_color=(1.0, 1.0, 1.0, 1.0), alpha_mode="opaque", alpha_cutoff=0.5)
 
 
 def picture_size(sequence: MeshSequence) -> tuple[int, int]:

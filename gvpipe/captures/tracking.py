@@ -66,8 +66,7 @@ def is_tracked_by_default(capture: Capture) -> bool:
     alone = sum(length == 1 for length in capture.lengths)
     if len(capture) <= 2 or 2 * alone <= len(capture):
         return False
-    first = capture.shots[0]
-    return not what_is_lost(first) and not first.fields
+    return not any(shot.fields or what_is_lost(shot) for shot in capture.shots)
 
 
 def what_is_lost(shot: MeshSequence) -> list[str]:
@@ -99,6 +98,7 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
     rms = RMS if max_error is None else min(RMS, RMS_SHARE * max_error)
     shots: list[MeshSequence] = []
     keys: list[int | None] = []
+    losses: list[list[str]] = []
     progress("follow", 0.0)
     worst_rms, worst, followed, size = 0.0, 0.0, 0, (0, 0)
     for is_long, span in _stretches(capture):
@@ -110,9 +110,13 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
         frames = CaptureFrames(capture.part(start, stop))
         for run in follow(frames, max_error=bound, rms=rms, vertices=vertices, progress=progress):
             keys.append(None if run.key is None else start + run.key)
-            shots.append(capture.frame(start + run.start) if run.key is None else _shot(capture, start, run, frames.origin))
-            size = max(size, picture_size(shots[-1]) if run.key is not None else size)
-            if run.key is not None:
+            if run.key is None:
+                shots.append(capture.frame(start + run.start))
+            else:
+                shot, lost = _shot(capture.part(start + run.start, start + run.stop), run, frames.origin)
+                shots.append(shot)
+                losses.append(lost)
+                size = max(size, picture_size(shot))
                 followed += run.stop - run.start
                 worst_rms = max(worst_rms, *(error.rms for error in run.errors))
                 worst = max(worst, *(error.largest for error in run.errors))
@@ -126,11 +130,8 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
             f"{alone} are as they came (--track off: all)"
         )
         notes += [f"colours of each frame become textures that move, of up to {size[0]}x{size[1]} texels"] if size[0] else []
-        first = capture.shots[0]
-        lost = what_is_lost(first)
-        kept = [shot.fields for shot, key in zip(shots, keys, strict=True) if key is not None]
-        lost += [name for name in first.fields if not all(name in fields for fields in kept)]
-        notes += [f"{SURFACE_ALONE}; left out: {', '.join(lost)}"] if lost else []
+        left_out = dict.fromkeys(name for names in losses for name in names)
+        notes += [f"{SURFACE_ALONE}; left out: {', '.join(left_out)}"] if left_out else []
     found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
     return Tracked(found, tuple(keys), tuple(notes))
 
@@ -157,14 +158,29 @@ def _stretches(capture: Capture) -> Iterator[tuple[bool, list[int]]]:
         yield is_long, list(numbers)
 
 
-def _shot(capture: Capture, start: int, run: Run, origin: Float64) -> MeshSequence:
-    """A run of ``capture`` whose first frame is ``start + run.start``, with the looks and fields of its frames."""
-    first = capture.frame(start + run.start)
+def _shot(frames: Capture, run: Run, origin: Float64) -> tuple[MeshSequence, list[str]]:
+    """A run with the looks and fields of its ``frames``, and names of what it leaves out of them."""
+    first = frames.shots[0]
     metadata = first.metadata
     if metadata.times:
-        times = tuple(float(capture.frame(start + k).times[0]) for k in range(run.start, run.stop))
+        times = tuple(float(frames.frame(k).times[0]) for k in range(len(frames)))
         metadata = replace(metadata, times=times)
-    followed = FollowedFrames(capture.part(start + run.start, start + run.stop), origin, run)
+    followed = FollowedFrames(frames, origin, run)
     fields = sampled_fields(followed)
-    bare = MeshSequence(run.positions, run.faces, capture.fps, {}, capture.name, origin, fields=fields, metadata=metadata)
-    return with_looks(bare, followed)
+    lost = [name for shot in frames.shots for name in (*what_is_lost(shot), *shot.fields) if name not in fields]
+    lost = list(dict.fromkeys(lost))
+    not_carried = dict.fromkeys([*lost, *(name for shot in frames.shots for name in shot.not_carried)])
+    notes = dict.fromkeys(note for shot in frames.shots for note in shot.notes)
+    bare = MeshSequence(
+        run.positions,
+        run.faces,
+        frames.fps,
+        {},
+        frames.name,
+        origin,
+        fields=fields,
+        metadata=metadata,
+        not_carried=tuple(not_carried),
+        notes=tuple(notes),
+    )
+    return with_looks(bare, followed), lost
