@@ -22,6 +22,7 @@ LONG = 8  # frames of a shot that is kept as it is
 SHARE = 0.6  # of a largest distance that is asked for: what following may use, and coding the rest
 RMS_SHARE = 0.3  # of the same: the greatest rms
 CODED_RMSE = 0.0005  # of vertices, part of the diagonal; most of it lies along the surface
+CODED_LARGEST = 0.0025  # of vertices: what coding may always add; more, where following leaves more of `MAX_ERROR`
 SURFACE_ALONE = "only the surface is followed"
 
 Targets = tuple[float | None, float | None, float | None, float | str | None]
@@ -35,17 +36,28 @@ class Tracked:
     Args:
         capture: the shots that there are now.
         keys: of each shot, the frame of the capture that its mesh comes from; None: it is as it came.
+        largest: of each shot, the greatest distance between its surface and those of its frames, part of the diagonal.
         notes: what a user should know, a line each.
     """
 
     capture: Capture
     keys: tuple[int | None, ...]
+    largest: tuple[float, ...]
     notes: tuple[str, ...]
 
     @property
     def is_any(self) -> bool:
         """Whether a shot was followed."""
         return any(key is not None for key in self.keys)
+
+
+def coded_largest(followed: float) -> float:
+    """The greatest error of a vertex that coding may add where nobody asks for another, part of the diagonal.
+
+    Args:
+        followed: the greatest distance that following leaves, part of the diagonal.
+    """
+    return max(MAX_ERROR - followed, CODED_LARGEST)
 
 
 def coding_targets(targets: Targets, is_followed: bool) -> Targets:
@@ -98,18 +110,21 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
     rms = RMS if max_error is None else min(RMS, RMS_SHARE * max_error)
     shots: list[MeshSequence] = []
     keys: list[int | None] = []
+    largest: list[float] = []
     losses: list[list[str]] = []
     progress("follow", 0.0)
-    worst_rms, worst, followed, size = 0.0, 0.0, 0, (0, 0)
+    worst_rms, followed, size = 0.0, 0, (0, 0)
     for is_long, span in _stretches(capture):
         if is_long:
             shots += [capture.shots[number] for number in span]
             keys += [None] * len(span)
+            largest += [0.0] * len(span)
             continue
         start, stop = capture.starts[span[0]], capture.starts[span[-1]] + capture.lengths[span[-1]]
         frames = CaptureFrames(capture.part(start, stop))
         for run in follow(frames, max_error=bound, rms=rms, vertices=vertices, progress=progress):
             keys.append(None if run.key is None else start + run.key)
+            largest.append(0.0 if run.key is None else max(error.largest for error in run.errors))
             if run.key is None:
                 shots.append(capture.frame(start + run.start))
             else:
@@ -119,11 +134,10 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
                 size = max(size, picture_size(shot))
                 followed += run.stop - run.start
                 worst_rms = max(worst_rms, *(error.rms for error in run.errors))
-                worst = max(worst, *(error.largest for error in run.errors))
     notes = []
     if followed:
         runs = sum(key is not None for key in keys)
-        distance = f"rms {worst_rms:.2g}, at most {worst:.2g} of the diagonal"
+        distance = f"rms {worst_rms:.2g}, at most {max(largest):.2g} of the diagonal"
         alone = len(capture) - followed
         notes.append(
             f"{count(followed, 'frame')} follow {count(runs, 'key mesh', 'key meshes')}: {distance}; "
@@ -133,7 +147,7 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
         left_out = dict.fromkeys(name for names in losses for name in names)
         notes += [f"{SURFACE_ALONE}; left out: {', '.join(left_out)}"] if left_out else []
     found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
-    return Tracked(found, tuple(keys), tuple(notes))
+    return Tracked(found, tuple(keys), tuple(largest), tuple(notes))
 
 
 class CaptureFrames:
