@@ -78,7 +78,13 @@ def is_tracked_by_default(capture: Capture) -> bool:
     alone = sum(length == 1 for length in capture.lengths)
     if len(capture) <= 2 or 2 * alone <= len(capture):
         return False
-    return not any(shot.fields or what_is_lost(shot) for shot in capture.shots)
+    return not any(shot.fields for shot in capture.shots) and not _losses(capture)
+
+
+def _losses(capture: Capture) -> list[str]:
+    """What following leaves behind of any shot, by name."""
+    painted = set().union(*map(paint_names, capture.shots))  # coordinates, also in a frame whose picture is missing
+    return list(dict.fromkeys(name for shot in capture.shots for name in what_is_lost(shot) if name not in painted))
 
 
 def what_is_lost(shot: MeshSequence) -> list[str]:
@@ -181,8 +187,8 @@ def _shot(frames: Capture, run: Run, origin: Float64) -> tuple[MeshSequence, lis
         metadata = replace(metadata, times=times)
     followed = FollowedFrames(frames, origin, run)
     fields = sampled_fields(followed)
-    lost = [name for shot in frames.shots for name in (*what_is_lost(shot), *shot.fields) if name not in fields]
-    lost = list(dict.fromkeys(lost))
+    lost = _losses(frames)
+    lost += dict.fromkeys(name for shot in frames.shots for name in shot.fields if name not in fields)
     not_carried = dict.fromkeys([*lost, *(name for shot in frames.shots for name in shot.not_carried)])
     notes = dict.fromkeys(note for shot in frames.shots for note in shot.notes)
     bare = MeshSequence(

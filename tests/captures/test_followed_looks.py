@@ -172,6 +172,9 @@ def test_what_following_loses_keeps_it_from_being_the_default() -> None:
     assert tracking.what_is_lost(shiny) == ["materials but the first"]
     assert tracking.what_is_lost(shiny.with_looks((material, replace(material, name="b")), shot.images, tuple(halves))) == []
     assert material.base_color_texture is not None
+    blank = shot.with_looks((replace(material, base_color_texture=None),), (), shot.parts)
+    assert tracking.what_is_lost(blank) == ["uv"]  # but not beside frames that have a picture
+    assert tracking.is_tracked_by_default(gvpipe.Capture([shot, blank, frame(1, "textures")]))
     film = gvpipe.Image("film", "image/x-exr", b"\x76\x2f\x31\x01")  # nothing here decodes it
     assert tracking.what_is_lost(shot.with_looks(shot.materials, (film,), shot.parts)) == ["pictures that cannot be decoded"]
     with_more = MeshSequence(shot.positions, shot.faces, 25.0, {"weight": np.zeros(shot.n_vertices, np.float32)})

@@ -49,7 +49,7 @@ def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
 
 
 def test_captures_are_named_and_their_shots_can_be_packed(sequence: MeshSequence, folder: Path, tmp_path: Path) -> None:
-    shots = [sequence.part(0, 2), gvpipe.MeshSequence(np.eye(3)[None], [[0, 1, 2]], sequence.fps)]
+    shots = [sequence.part(0, 2), gvpipe.MeshSequence(np.eye(3)[None], np.array([[0, 1, 2]], np.int32), sequence.fps)]
     gvpipe.encode(gvpipe.Capture(shots), folder / "c.mp4", track=False)
     left, names = packed(folder, tmp_path / "out.tar")
     assert set(left) == {"c.mp4"} and "encode --split makes a file of each shot" in left["c.mp4"]
