@@ -36,6 +36,7 @@ SHARED = {
     "gvpipe.connectivity.base_mesh": "DRACO_PREFIX MAX_PER_BYTE",
     "gvpipe.connectivity.cell_kernels": "N_CONTEXTS",
     "gvpipe.connectivity.cell_middles": "MIDDLES",
+    "gvpipe.connectivity.cell_traversal": "KEEPS RANKED",
     "gvpipe.connectivity.cell_poses": "KINDS MOST_POSES MOST_NODES MOST_FACES",
     "gvpipe.connectivity.edge_seam_kernels": "CONTEXTS DECODE",
     "gvpipe.connectivity.order_kernels": "N_CONTEXTS N_GROUPS",

@@ -30,7 +30,7 @@ from gvpipe.asset_coding.volume_list import (
 from gvpipe.asset_coding.volume_rows import VolumeRows
 from gvpipe.coding.codec import FrameReader
 from gvpipe.connectivity.cell_poses import KINDS
-from gvpipe.connectivity.cell_traversal import encode_walk
+from gvpipe.connectivity.cell_traversal import RANKED, encode_walk
 from gvpipe.connectivity.cells import encode_cells, encode_order
 from gvpipe.connectivity.polyhedral_cells import encode_polyhedral
 from gvpipe.fields.encoder import encode_field
@@ -128,7 +128,8 @@ class VolumeCoder:
                 some = plan._replace(field=field.select(chosen[domain]))
                 made[section] = _coded(name, some, rows.graphs[domain], n_beside + sum(map(len, made.values())))
         unmoved = frozenset((plan.field.domain, name) for name, plan in self._plans if len(plan.field) == 1)
-        version = PLAIN_VERSION if made[CELLS][0] in (IN_ORDER, BY_WALK) else VERSION
+        is_plain = made[CELLS][0] == IN_ORDER or (made[CELLS][0] == BY_WALK and made[CELLS][1] < RANKED)
+        version = PLAIN_VERSION if is_plain else VERSION
         counts, is_free = (len(cells.types), volume.n_points), cells.polyhedra is not None
         about = VolumeList(*counts, bound, volume.blocks, tuple(listed), unmoved, version, is_free)
         return {SECTION: pack_volume(about), **made}

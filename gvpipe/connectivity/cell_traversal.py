@@ -1,10 +1,11 @@
 """Cells of a grid <-> bytes by a walk from the surface inwards: hardly any number of a point is coded.
 
-The faces of the surface are known. The face that has waited longest for a cell behind it is taken. That cell has some type,
-and stands on the face in some pose. Its other nodes are new points, or points of open faces near it, ranked by how many edges
-lead to them. Cells and inner points come in the order of the walk. What their order was costs extra::
+The faces of the surface are known. Of those without a cell behind them, the one that has waited longest is taken, or, ranked,
+one at whose edges most cells are: there the next cell is surest. That cell has some type, and stands on the face in some pose.
+Its other nodes are new points, or points of open faces near it, by how many edges lead to them. Cells and inner points come in
+the order of the walk. What their order was costs extra::
 
-    section = [8 bits] keeps (0, 1), [block] marks, [block] walk, if it keeps: [block] packed cells, packed inner points
+    section = [8 bits] 1: keeps, 2: ranked, [block] marks, [block] walk, if it keeps: [block] packed cells, packed inner points
 
 `[block]` is [varint] bytes, then these. Marks are bits, 1 for polygons that have a cell behind them; none: all have. The cells
 and inner points of the source, in the order of the walk, are deflated planes (`gvpipe.connectivity.planes`).
@@ -49,6 +50,7 @@ from gvpipe.grids.cells import SIZE_OF_TYPE, Cells
 from gvpipe.mesh.unique_rows import row_ids
 
 BYTES_PER_CELL, SECONDS_PER_CELL = 1200, 4e-6  # of decoding
+KEEPS, RANKED = 1, 2  # bits of a byte
 BYTES_PER_MIDDLE, SECONDS_PER_MIDDLE = 250, 1e-6
 
 
@@ -106,23 +108,29 @@ def encode_walk(
     nodes = np.zeros((len(kinds), 8), np.int64)
     place = np.arange(len(corners.nodes)) - np.repeat(corners.offsets[:-1], corners.sizes)
     nodes[np.repeat(np.arange(len(kinds)), corners.sizes), place] = number[corners.nodes]
-    coder = SerialEncoder(N_CONTEXTS, 16 * len(kinds))
     source = Source(kinds, nodes, across, some.behind)
-    limits = n_surface, len(inner), len(kinds)
-    found = code_cells(coder.coder, make_poses(), source, some.nodes, some.sizes, limits, keeps)
-    if found[0][0] == NOT_REGULAR or (found[3] < 0).any():
-        return None
-    points = inner[found[3]]
-    made = _encode_middles(cells, (found[0], found[1], found[2]), points, types, (sides, *counts))
-    if made is None:
-        return None
-    walk = Walk(_as_cells(found[0], made[0], types), found[2], made[1])
-    head = b"" if _is_linear(types) else types.tobytes() + varint(len(inner) - n_surface) + bytes([not starts.any()])
-    head += bytes([keeps]) + pack_block(b"" if is_seed.all() else np.packbits(is_seed).tobytes()) + pack_block(coder.finish())
-    if keeps:
-        head += pack_block(deflated(to_planes(walk.sources[:, None])))
-        head += deflated(to_planes(walk.points[n_surface:, None]))
-    return head, walk
+    start = b""
+    if not _is_linear(types):
+        start = types.tobytes() + varint(len(inner) - n_surface) + bytes([not starts.any()])
+    marks = pack_block(b"" if is_seed.all() else np.packbits(is_seed).tobytes())
+    best: tuple[bytes, Walk] | None = None
+    for is_ranked in (False, True):  # neither is the smaller one on all grids
+        coder = SerialEncoder(N_CONTEXTS, 16 * len(kinds))
+        limits = n_surface, len(inner), len(kinds)
+        found = code_cells(coder.coder, make_poses(), source, some.nodes, some.sizes, limits, keeps, is_ranked)
+        if found[0][0] == NOT_REGULAR or (found[3] < 0).any():
+            continue
+        made = _encode_middles(cells, (found[0], found[1], found[2]), inner[found[3]], types, (sides, *counts))
+        if made is None:
+            return None
+        walk = Walk(_as_cells(found[0], made[0], types), found[2], made[1])
+        data = start + bytes([KEEPS * keeps + RANKED * is_ranked]) + marks + pack_block(coder.finish())
+        if keeps:
+            data += pack_block(deflated(to_planes(walk.sources[:, None])))
+            data += deflated(to_planes(walk.points[n_surface:, None]))
+        if best is None or len(data) < len(best[0]):
+            best = data, walk
+    return best
 
 
 def decode_walk(
@@ -164,7 +172,8 @@ def decode_walk(
     n_middles = 0 if is_linear else most_middles(types) * n_cells
     memory = BYTES_PER_CELL * (n_cells + n_corners) + BYTES_PER_MIDDLE * n_middles
     budget.ask(f"section {name!r}", memory, SECONDS_PER_CELL * n_cells + SECONDS_PER_MIDDLE * n_middles)
-    keeps = cursor.take(1)[0] == 1
+    flags = cursor.take(1)[0]
+    keeps, is_ranked = bool(flags & KEEPS), bool(flags & RANKED)
     seeds = _seeds(*surface, None)
     mask = np.frombuffer(cursor.block(), np.uint8)
     if len(mask):
@@ -178,7 +187,7 @@ def decode_walk(
     none = np.zeros(0, np.int64)
     source = Source(none, np.zeros((0, 8), np.int64), np.zeros((0, 6), np.int64), none)
     limits = counts[0], n_corners, n_cells
-    kinds, nodes, _, _ = code_cells(coder.coder, make_poses(), source, seeds.nodes, seeds.sizes, limits, keeps)
+    kinds, nodes, _, _ = code_cells(coder.coder, make_poses(), source, seeds.nodes, seeds.sizes, limits, keeps, is_ranked)
     coder.end()
     if not is_linear:
         nodes, _, numbers = _with_middles(kinds, nodes, types, (sides, n_corners))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cell_grids import SPLITS, numbered, quadratic, rows_of
+from cell_grids import SPLITS, lattice, numbered, quadratic, rows_of
 
 from gvpipe.connectivity.cell_middles import MIDDLES
-from gvpipe.connectivity.cell_traversal import Walk, decode_walk, encode_walk
+from gvpipe.connectivity.cell_traversal import RANKED, Walk, decode_walk, encode_walk
 from gvpipe.connectivity.cells import encode_cells
 from gvpipe.foundation.budget import Budget
 from gvpipe.foundation.errors import CorruptFile, OverBudget
-from gvpipe.grids.cells import Cells, equal_cells
+from gvpipe.grids.cells import Cells, equal_cells, structured_cells
 from gvpipe.io.simulation.surface import Surface
 
 NAME = "volume.cells"
@@ -48,6 +48,19 @@ def test_cells_that_share_no_middles_are_coded_otherwise() -> None:
     nodes[5, 4] = len(points)  # a point of its own on an edge that others have, too
     cells, surface, counts = numbered(equal_cells(24, nodes), np.concatenate([points, points[:1]]))
     assert encode_walk(cells, surface.faces, surface.polygons, counts, True) is None
+
+
+def test_the_smaller_order_of_faces_is_kept() -> None:
+    """Both orders decode; tetrahedra take the one by ranks."""
+    corners = structured_cells((6, 5, 5)).nodes.reshape(-1, 8)
+    tetrahedra = equal_cells(10, np.concatenate([corners[:, list(split)] for split in SPLITS[24]]))
+    flags = []
+    for cells, points in ((tetrahedra, lattice((6, 5, 5))), (structured_cells((4, 4, 3)), lattice((4, 4, 3)))):
+        own, surface, counts = numbered(cells, points)
+        data, walk = walked(own, surface, counts, False)
+        flags.append(data[0])
+        assert decode_walk(data, (surface.faces, surface.polygons), counts, len(cells.types), NAME).equals(walk.cells)
+    assert flags == [RANKED, 0]
 
 
 def test_damaged_sections() -> None:

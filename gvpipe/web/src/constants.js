@@ -77,6 +77,10 @@ export const CELL_KERNELS_N_CONTEXTS = 526;
 // gvpipe.connectivity.cell_middles
 export const CELL_MIDDLES_MIDDLES = new Map([[24, [10, [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]]], [25, [12, [[0, 1], [1, 2], [2, 3], [0, 3], [4, 5], [5, 6], [6, 7], [4, 7], [0, 4], [1, 5], [2, 6], [3, 7]]]], [26, [13, [[0, 1], [1, 2], [0, 2], [3, 4], [4, 5], [3, 5], [0, 3], [1, 4], [2, 5]]]], [27, [14, [[0, 1], [1, 2], [2, 3], [0, 3], [0, 4], [1, 4], [2, 4], [3, 4]]]], [29, [12, [[0, 1], [1, 2], [2, 3], [0, 3], [4, 5], [5, 6], [6, 7], [4, 7], [0, 4], [1, 5], [2, 6], [3, 7], [0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 2, 3, 4, 5, 6, 7]]]]]);
 
+// gvpipe.connectivity.cell_traversal
+export const CELL_TRAVERSAL_KEEPS = 1;
+export const CELL_TRAVERSAL_RANKED = 2;
+
 // gvpipe.connectivity.cell_poses
 export const CELL_POSES_KINDS = [10, 12, 13, 14];
 export const CELL_POSES_MOST_POSES = 24;

@@ -8,6 +8,8 @@ import {
   CELL_POSES_MOST_FACES as MOST_FACES,
   CELL_POSES_MOST_NODES as MOST_NODES,
   CELL_POSES_MOST_POSES as MOST_POSES,
+  CELL_TRAVERSAL_KEEPS as KEEPS,
+  CELL_TRAVERSAL_RANKED as RANKED,
 } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { previousEqual } from "../format/points.js";
@@ -29,7 +31,8 @@ export async function decodeWalk(given, data, { faces, polygons }, counts, { nam
   const kernels = given.fresh();
   const cursor = new Cursor(data, name);
   const head = isLinear ? { types: KINDS, corners: counts.points, isLate: false } : readTypes(cursor, counts);
-  const keeps = cursor.u8() === 1;
+  const flags = cursor.u8();
+  const [keeps, isRanked] = [(flags & KEEPS) !== 0, (flags & RANKED) !== 0];
   const marked = markedSeeds(faces, polygons, cursor.block(), isLinear ? [3, 4] : [3, 4, 6, 8], cursor);
   const sides = [];
   const seeds = walkingOrder(marked.map((seed) => cornersOf(seed, head.isLate, sides)));
@@ -37,7 +40,7 @@ export async function decodeWalk(given, data, { faces, polygons }, counts, { nam
   const source = [[0], [0, MOST_NODES], [0, MOST_FACES], [0]].map((shape) => kernels.array("int64", shape));
   const shapes = [kernels.whole(seeds.flatMap(({ nodes }) => nodes), [seeds.length, 4]), kernels.whole(seeds.map(({ size }) => size))];
   const limits = [counts.vertices, head.corners, counts.cells];
-  const found = kernels.call("code_cells", ...stream.arrays, ...placedPoses(kernels), ...source, ...shapes, ...limits, keeps);
+  const found = kernels.call("code_cells", ...stream.arrays, ...placedPoses(kernels), ...source, ...shapes, ...limits, keeps, isRanked);
   stream.end();
   const coded = { kinds: kernels.numbers(found[0]), nodes: kernels.numbers(found[1]), width: MOST_NODES, types: head.types };
   const walk = isLinear ? coded : withMiddles(coded, sides, head.corners, counts.points, cursor);
