@@ -32,7 +32,7 @@ from gvpipe.grids.volume import Volume
 from gvpipe.runtime.forks import ForkLock
 
 BYTES_PER_CELL, SECONDS_PER_CELL = 1200, 6e-6  # of faces, edges and the graph
-BYTES_PER_POINT, SECONDS_PER_POINT = 1500, 8e-6
+BYTES_PER_POINT, SECONDS_PER_POINT = 700, 8e-6
 
 
 def read_volume_list(bitstream: Bitstream) -> VolumeList | None:

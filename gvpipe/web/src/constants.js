@@ -32,7 +32,7 @@ export const VOLUME_LIST_MOST_POINTS = 16777216;
 // gvpipe.asset_coding.volume_reader
 export const VOLUME_READER_BYTES_PER_CELL = 1200;
 export const VOLUME_READER_SECONDS_PER_CELL = 6e-06;
-export const VOLUME_READER_BYTES_PER_POINT = 1500;
+export const VOLUME_READER_BYTES_PER_POINT = 700;
 export const VOLUME_READER_SECONDS_PER_POINT = 8e-06;
 
 // gvpipe.attributes.linear_kernels

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cell_grids import lattice, sequence_of, voronoi
 
 import gvpipe
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import Cells, join_cells
+from gvpipe.grids.cells import Cells, equal_cells, join_cells
 from gvpipe.grids.polyhedra import Polyhedra, from_faces, from_streams
 from gvpipe.io.simulation.surface import extract_surface
 
 POINTS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1, 2, 3)], np.float64)
+PENTAGON = ((0, 0), (2, 0), (3, 1), (1, 2), (-1, 1))
 HEXAHEDRON = [1, 2, 6, 5, 9, 10, 14, 13]
 
 
@@ -172,3 +174,31 @@ def test_vtkhdf_has_numbers_of_faces(tmp_path: Path) -> None:
             root[name] = values
         root.create_group("CellData")["load"] = np.array([1.5, 2.5, 3.5], np.float32)
     check(gvpipe.read(tmp_path / "a.vtkhdf"))
+
+
+def test_data_objects_of_vtk_hold_polyhedra() -> None:
+    pytest.importorskip("vtkmodules")
+    given = sequence_of(*voronoi(12))
+    objects = [gvpipe.to_vtk(given, frame) for frame in range(len(given))]
+    back = gvpipe.from_vtk(objects, [0, 1, 2], volume=True)
+    assert objects[0].GetCellType(0) == 42 and back.volume is not None and given.volume is not None
+    own, other = (each.cells.renumbered(np.asarray(each.order)) for each in (given.volume, back.volume))
+    assert own.polyhedra is not None and other.polyhedra is not None and own.polyhedra.equals(other.polyhedra)
+    assert gvpipe.from_vtk(objects, [0, 1, 2]).volume is None
+
+
+@pytest.mark.parametrize("kind", [11, 15])
+def test_cells_that_xdmf_has_not(kind: int, tmp_path: Path) -> None:
+    """Voxels become hexahedra of the same corners; prisms are refused by name, and no file is left."""
+    pytest.importorskip("h5py")
+    corners = lattice((2, 2, 2)) if kind == 11 else np.array([[x, y, z] for z in (0, 1) for x, y in PENTAGON], np.float64)
+    given = sequence_of(equal_cells(kind, np.arange(len(corners))[None]), corners)
+    if kind == 15:
+        with pytest.raises(InputError, match=r"XDMF has no cells of VTK's type 15; .vtu, .pvd and .vtkhdf hold them"):
+            gvpipe.write(given, tmp_path / "a.xdmf")
+        assert not list(tmp_path.iterdir())
+        return
+    gvpipe.write(given, tmp_path / "a.xdmf")
+    found = gvpipe.read(tmp_path / "a.xdmf", volume=True)
+    assert found.volume is not None and found.volume.cells.types.tolist() == [12]
+    assert np.array_equal(np.asarray(found[0])[found.volume.cells.nodes], corners[[0, 1, 3, 2, 4, 5, 7, 6]].astype(np.float32))
