@@ -68,7 +68,7 @@ def _with_known_types(sequence: MeshSequence, path: Path) -> tuple[MeshSequence,
     cells = volume.cells
     strange = sorted(set(np.unique(cells.types).tolist()) - {*TYPE_NUMBERS, VOXEL})
     if strange:
-        raise InputError(f"{path}: XDMF has no cells of VTK's type {strange[0]}; .vtu, .pvd and .vtkhdf hold them")
+        raise InputError(f"{path}: XDMF has no cells of VTK's type {strange[0]}; write .vtu, .pvd or .vtkhdf")
     at = np.flatnonzero(cells.types == VOXEL)
     if not len(at):
         return sequence, ()
