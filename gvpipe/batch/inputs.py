@@ -1,7 +1,8 @@
 """Which sequences an input of many names, and which file each becomes.
 
 A scene, an archive, a point cache or a simulation is a sequence. Frame files (OBJ, PLY, ...) are one with the others of their
-folder and format; those that a list of time steps names (.pvd, .series) are its own. Outputs keep the folders below the part of a glob that has no wildcard, or below a folder that is given.
+folder and format; those that a list of time steps (.pvd, .series) names are its own. Outputs keep the folders below the part of
+a glob that has no wildcard, or below a folder that is given.
 """
 
 from __future__ import annotations
