@@ -1,0 +1,64 @@
+"""The encoder's search for residuals on the trellis (`gvpipe.trajectory.trellis`): of all paths the cheapest, vector by vector.
+
+What: Viterbi's algorithm over a vector's components. A path's cost is its squared error, in squared fine steps, and `PENALTY` for
+every bit. In closed loop: each path has the weights of the ``kalman`` predictor that follow from its own residuals. Their
+covariances are those of all paths, since they follow from the neighbours alone.
+
+Bits come from the contexts' first tables, contexts from residuals of plain rounding, which hardly differ. A cost must be less by
+`MARGIN` to win, so that rounding of the input on other machines decides nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from gvpipe.entropy.tokens import N_EXTRA, tokenise
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.contexts import context_inputs, level_of
+from gvpipe.trajectory.trellis import FINENESS, first_tables
+
+N_PRICED = 64  # magnitudes that have a price of their own
+PRICE_ONE = 1024  # prices are whole 1 / PRICE_ONE bits
+
+
+def search(
+    target: Float64, step: float, causal: CausalOrder, given: Float64 | None, penalty: float
+) -> tuple[Int64, Int64]:
+    """Return the integers k ``(m, R)`` and the residuals r ``(m, R)``, by rank, for ``target (n, R)``.
+
+    Args:
+        target, causal, given: as of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
+        step: of plain rounding, in the unit of the components.
+        penalty: of a bit, in squared fine steps.
+    """
+    from gvpipe.trajectory.context_kernels import find_all_contexts
+    from gvpipe.trajectory.prediction_kernels import VectorCoding
+    from gvpipe.trajectory.trellis_search_kernels import search_paths
+
+    n_ranks, n_components = len(causal.order), target.shape[1]
+    plain = np.zeros((n_ranks, n_components), np.int64)
+
+    def decoded() -> Float64:
+        return np.zeros(target.shape) if given is None else given.copy()
+
+    from gvpipe.trajectory.prediction import predict_vectors
+
+    predict_vectors(causal, step, plain, decoded(), target, "kalman", 0.0)
+    fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
+    levels = level_of(fine)
+    contexts = find_all_contexts(fine, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
+    residuals = np.zeros((n_ranks, n_components), np.int64)
+    numbers = search_paths(VectorCoding(causal, step * FINENESS, residuals, decoded(), target), contexts, _prices(), penalty)
+    return numbers, residuals
+
+
+@functools.cache
+def _prices() -> Float64:
+    """Bits ``(54, N_PRICED)`` of magnitudes of k in each context, the sign counted."""
+    tables = first_tables()
+    tokens, _, _ = tokenise(np.arange(N_PRICED))
+    bits = np.log2(tables.sum(axis=1, keepdims=True)) - np.log2(tables[:, tokens]) + N_EXTRA[tokens]
+    return np.asarray(np.rint(PRICE_ONE * bits) / PRICE_ONE)
