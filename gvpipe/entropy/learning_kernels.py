@@ -1,7 +1,7 @@
 """Kernels of blocks whose tables learn: each context's frequencies grow by what was coded in it, block after block.
 
-Why: tables that are sent take three bytes and more each, and fit the whole stream alike. A context's first table is known to both
-sides; after each block its tokens count. A magnitude counts for both of its signs.
+Why: tables that are sent take three bytes and more each, and fit the whole stream alike. A context's first table is known to
+both sides; after each block its tokens count. A magnitude counts for both of its signs.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from gvpipe.entropy.tokens import CHUNK, DIRECT
 from gvpipe.foundation.arrays import Int64, UInt32, UInt64
 from gvpipe.runtime.compiled import compiled
 
-GAIN = 1 << 14  # by which a token's frequency grows: first tables, of 2**20 about, count for 64 tokens
-MOST = 1 << 24  # a table's total, about, above which its frequencies are halved: 1024 tokens
+GAIN = 1 << 13  # by which a token's frequency grows: first tables, of 2**20 about, count for 128 tokens
+MOST = 1 << 22  # a table's total above which its frequencies are halved: 512 tokens
 
 
 class LearningStream(NamedTuple):

@@ -1,7 +1,7 @@
 """Range encoding inside compiled loops, mirror of `gvpipe.entropy.range_decoder`, where tables change while values are coded.
 
-A state is ``(3,) uint64``: the lower end of the interval, its extent, and how many words are written. A carry goes back into the
-words that are there.
+A state is ``(3,) uint64``: the lower end of the interval, its extent, and how many words are written. A carry goes back into
+the words that are there.
 """
 
 from __future__ import annotations

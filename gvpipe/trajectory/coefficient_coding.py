@@ -91,12 +91,10 @@ def _encode_trellis(
     target: Float64, step: float, causal: CausalOrder, given: Float64 | None, penalty: float
 ) -> tuple[bytes, Float64]:
     """As `encode_vectors`, on a trellis."""
-    numbers, ranked = search(target, step, causal, given, penalty)
+    numbers, ranked, decoded = search(target, step, causal, given, penalty)
     _check_residuals(ranked)
     levels = level_of(ranked)
     words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
-    decoded = np.zeros(target.shape) if given is None else given.copy()
-    predict_vectors(causal, step * FINENESS, ranked, decoded, None, "kalman", 0.0)
     return pack_block(encode_integers(np.diff(levels, prepend=0))) + varint(TRELLIS) + words, decoded
 
 

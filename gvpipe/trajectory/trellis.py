@@ -25,7 +25,7 @@ from gvpipe.trajectory.contexts import N_CONTEXTS
 
 FINENESS = 21 / 32  # of a step
 N_STATES, N_QUANTISERS = 8, 2
-NEXT = ((0, 2), (5, 7), (1, 3), (4, 6), (2, 0), (7, 5), (3, 1), (6, 4))  # state by state, after an even and an odd k
+FEEDBACK, PARITY = 5, 2  # of the code: state s leads to ``(s >> 1) ^ FEEDBACK (s & 1) ^ PARITY (k & 1)``
 ZEROS = (  # first tables (`parametric_tables.table`): of each quantiser, by the context of the forecast
     (255, 255, 254, 252, 247, 242, 235, 224, 206, 184, 152, 118, 88, 66, 49, 35, 26, 19, 14, 10, 8, 7, 6, 5, 4, 3, 2),
     (255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1),

@@ -7,7 +7,7 @@ import numpy as np
 from gvpipe.entropy.block_kernels import OUT_OF_RANGE
 from gvpipe.entropy.learning_kernels import BlockMemory, LearningStream, code_block, new_block_memory
 from gvpipe.foundation.arrays import Int64
-from gvpipe.runtime.compiled import compiled
+from gvpipe.runtime.compiled import compiled, inlined
 from gvpipe.trajectory.context_kernels import (
     Memory,
     entry,
@@ -18,7 +18,7 @@ from gvpipe.trajectory.context_kernels import (
     rank_residuals,
 )
 from gvpipe.trajectory.contexts import LARGEST, ContextInputs, Residuals
-from gvpipe.trajectory.trellis import NEXT, N_QUANTISERS
+from gvpipe.trajectory.trellis import FEEDBACK, N_QUANTISERS, PARITY
 
 
 @compiled
@@ -64,14 +64,24 @@ def code_residuals(
 def _take_states(row: Int64, states: Int64, memory: Memory, block: BlockMemory) -> int:
     """Fill ``row (n,)`` with residuals of the block's integers, and go to the next states; return 0 or OUT_OF_RANGE."""
     for i in range(len(row)):
-        number, quantiser = block.values[i], states[i] % N_QUANTISERS
-        residual = 2 * number
-        if number > 0:
-            residual -= quantiser
-        elif number < 0:
-            residual += quantiser
+        residual = residual_of(block.values[i], states[i])
         if abs(residual) >= LARGEST:
             return OUT_OF_RANGE
         row[i] = entry(residual)
-        states[i] = NEXT[states[i]][number & 1]
+        states[i] = next_state(states[i], block.values[i])
     return 0
+
+
+@inlined
+def residual_of(number: int, state: int) -> int:
+    """The residual of an integer k in a state."""
+    quantiser = state % N_QUANTISERS
+    if number == 0:
+        return 0
+    return 2 * number - quantiser if number > 0 else 2 * number + quantiser
+
+
+@inlined
+def next_state(state: int, number: int) -> int:
+    """The state after an integer k."""
+    return (state >> 1) ^ (FEEDBACK * (state & 1)) ^ (PARITY * (number & 1))

@@ -18,6 +18,7 @@ from gvpipe.entropy.tokens import N_EXTRA, tokenise
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import context_inputs, level_of
+from gvpipe.trajectory.prediction import predict_vectors
 from gvpipe.trajectory.trellis import FINENESS, first_tables
 
 N_PRICED = 64  # magnitudes that have a price of their own
@@ -26,8 +27,8 @@ PRICE_ONE = 1024  # prices are whole 1 / PRICE_ONE bits
 
 def search(
     target: Float64, step: float, causal: CausalOrder, given: Float64 | None, penalty: float
-) -> tuple[Int64, Int64]:
-    """Return the integers k ``(m, R)`` and the residuals r ``(m, R)``, by rank, for ``target (n, R)``.
+) -> tuple[Int64, Int64, Float64]:
+    """Return the integers k and the residuals r, both ``(m, R)`` by rank, and what they decode to ``(n, R)``.
 
     Args:
         target, causal, given: as of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
@@ -38,21 +39,14 @@ def search(
     from gvpipe.trajectory.prediction_kernels import VectorCoding
     from gvpipe.trajectory.trellis_search_kernels import search_paths
 
-    n_ranks, n_components = len(causal.order), target.shape[1]
-    plain = np.zeros((n_ranks, n_components), np.int64)
-
-    def decoded() -> Float64:
-        return np.zeros(target.shape) if given is None else given.copy()
-
-    from gvpipe.trajectory.prediction import predict_vectors
-
-    predict_vectors(causal, step, plain, decoded(), target, "kalman", 0.0)
+    shape = len(causal.order), target.shape[1]
+    plain, residuals = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    decoded, found = (np.zeros(target.shape) if given is None else given.copy() for _ in range(2))
+    predict_vectors(causal, step, plain, decoded, target, "kalman", 0.0)
     fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
-    levels = level_of(fine)
-    contexts = find_all_contexts(fine, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
-    residuals = np.zeros((n_ranks, n_components), np.int64)
-    numbers = search_paths(VectorCoding(causal, step * FINENESS, residuals, decoded(), target), contexts, _prices(), penalty)
-    return numbers, residuals
+    inputs = context_inputs(causal, len(target), level_of(fine), len(causal.blocks) - 1)
+    coding = VectorCoding(causal, step * FINENESS, residuals, found, target)
+    return search_paths(coding, find_all_contexts(fine, inputs), _prices(), penalty), residuals, found
 
 
 @functools.cache

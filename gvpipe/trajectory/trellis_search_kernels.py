@@ -7,14 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64, Int64, UInt8
-from gvpipe.runtime.compiled import compiled
+from gvpipe.runtime.compiled import compiled, inlined
 from gvpipe.runtime.lanes import LANES, load, same, store
 from gvpipe.trajectory.kalman_kernels import DOUBT
 from gvpipe.trajectory.prediction_kernels import VectorCoding, most_neighbours
-from gvpipe.trajectory.trellis import NEXT, N_QUANTISERS, N_STATES
+from gvpipe.trajectory.trellis import N_QUANTISERS, N_STATES
+from gvpipe.trajectory.trellis_kernels import next_state, residual_of
 
 MARGIN = 1e-6  # by which a path must be better
 LEAST = 1e-6  # fine steps: a difference below it has no sign
+FAR = 3  # above it, 0 is no choice
 NEVER = 1e300
 
 
@@ -26,8 +28,9 @@ class Paths(NamedTuple):
         weights, next_weights: n rows.
         numbers, before: ``(R, LANES)``: the integer k of a component, and the state that it came from.
         values: ``(R, LANES)``: what is decoded.
-        covariances: ``(n, n)`` of the weights, of all paths.
-        products, near: ``(n,)``: covariances times the neighbours' values of a component, and these.
+        covariances: n rows of n, or of the next multiple of LANES: of the weights, for all paths.
+        products, gains, next_products, near: as long as such a row: covariances times the neighbours' values of a component, the
+            same over its variance, the products to come, these values.
     """
 
     costs: Float64
@@ -41,6 +44,8 @@ class Paths(NamedTuple):
     values: Float64
     covariances: Float64
     products: Float64
+    gains: Float64
+    next_products: Float64
     near: Float64
 
 
@@ -71,54 +76,66 @@ def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty
             found[rank, c] = number = paths.numbers[c, state]
             coding.decoded[coding.causal.order[rank], c] = paths.values[c, state]
             state = paths.before[c, state]
-            coding.residuals[rank, c] = _residual(number, state)
+            coding.residuals[rank, c] = residual_of(number, state)
     return found
 
 
 @compiled
 def _begin(coding: VectorCoding, rank: int, paths: Paths) -> int:
     """Start in state 0 with the prior weights; return the number of neighbours."""
-    causal = coding.causal
+    causal, own = coding.causal, paths.covariances
     first, n = causal.starts[rank], causal.starts[rank + 1] - causal.starts[rank]
-    total = 0.0
+    total, width = 0.0, in_lanes(n)
     for j in range(n):
         total += causal.variances[first + j]
         store(paths.weights, LANES * j, same(causal.weights[first + j]))
-    for j in range(n):
+    for j in range(width):
+        paths.products[j] = paths.gains[j] = 0.0
         for k in range(n):
-            paths.covariances[j, k] = causal.variances[first + j] if j == k else 0.0
-            if causal.affine and total > 0:
-                paths.covariances[j, k] -= causal.variances[first + j] * causal.variances[first + k] / total
+            own[k * width + j] = causal.variances[first + j] if j == k else 0.0
+            if j < n and causal.affine and total > 0:
+                own[k * width + j] -= causal.variances[first + j] * causal.variances[first + k] / total
     store(paths.costs, 0, same(NEVER))
     paths.costs[0] = 0.0
     return int(n)
 
 
-@compiled
+@inlined
+def in_lanes(n: int) -> int:
+    """The multiple of LANES that is n or the next above it."""
+    return (n + LANES - 1) // LANES * LANES
+
+
+@inlined
 def _predict(coding: VectorCoding, rank: int, c: int, n: int, paths: Paths) -> float:
-    """Fill the paths' predictions of component c; return its variance, and update the covariances."""
-    causal, own, near, products = coding.causal, paths.covariances, paths.near[:n], paths.products[:n]
-    guesses, first = same(0.0), causal.starts[rank]
-    for j in range(n):
-        near[j] = coding.decoded[causal.neighbours[first + j], c]
-        guesses = guesses + load(paths.weights, LANES * j) * same(near[j])
-        products[j] = 0.0
-    store(paths.guesses, 0, guesses)
+    """Fill the paths' predictions of component c, and the covariances' products with its values; return its variance.
+
+    The last component's update of the covariances, ``gains * products'``, takes the same loop.
+    """
+    own, near, products, following = paths.covariances, paths.near, paths.products, paths.next_products
+    guesses, first, width = same(0.0), coding.causal.starts[rank], in_lanes(n)
+    for at in range(0, width, LANES):
+        store(following, at, same(0.0))
     for k in range(n):
-        column, value = own[k][:n], near[k]
-        for j in range(n):
-            products[j] += column[j] * value
+        near[k] = coding.decoded[coding.causal.neighbours[first + k], c]
+        guesses = guesses + load(paths.weights, LANES * k) * same(near[k])
+        gain, value = same(paths.gains[k]), same(near[k])
+        for at in range(0, width, LANES):
+            column = load(own, k * width + at) - gain * load(products, at)
+            store(own, k * width + at, column)
+            store(following, at, load(following, at) + column * value)
+    store(paths.guesses, 0, guesses)
     variance = coding.step * coding.step
     for j in range(n):
-        variance += (1 + DOUBT) * products[j] * near[j]
-    for k in range(n):
-        column, gain = own[k][:n], products[k] / variance
-        for j in range(n):
-            column[j] -= gain * products[j]
+        variance += (1 + DOUBT) * following[j] * near[j]
+    inverse = same(1 / variance)
+    for at in range(0, width, LANES):
+        store(products, at, load(following, at))
+        store(paths.gains, at, load(following, at) * inverse)
     return variance
 
 
-@compiled
+@inlined
 def _extend(target: float, step: float, prices: Float64, penalty: float, c: int, paths: Paths) -> None:
     """Find the best path to each state with component c: each state's integers are 0 and the two about the difference."""
     store(paths.next_costs, 0, same(NEVER))
@@ -129,20 +146,20 @@ def _extend(target: float, step: float, prices: Float64, penalty: float, c: int,
         size = abs(wanted)
         sign = -1 if wanted < -LEAST else 1
         below = (int(size) + quantiser) // 2
-        for choice in range(3):
+        for choice in range(1 if below > FAR else 0, 3):
             number = below + choice - 1 if choice else 0
             if choice == 1 and not below:
                 continue
             price = _price(prices[quantiser], number)
-            off = size - abs(_residual(number, state))
+            off = size - abs(residual_of(number, state))
             cost = paths.costs[state] + off * off + penalty * price
-            following = NEXT[state][number & 1]
+            following = next_state(state, number)
             if cost < paths.next_costs[following] - MARGIN:
                 paths.next_costs[following] = cost
                 paths.numbers[c, following], paths.before[c, following] = sign * number, state
 
 
-@compiled
+@inlined
 def _price(prices: Float64, number: int) -> float:
     """Bits of a magnitude; of large ones two more for each octave, about."""
     extra = 0.0
@@ -152,16 +169,7 @@ def _price(prices: Float64, number: int) -> float:
     return float(prices[number] + extra)
 
 
-@compiled
-def _residual(number: int, state: int) -> int:
-    """The residual of an integer in a state."""
-    quantiser = state % N_QUANTISERS
-    if number == 0:
-        return 0
-    return 2 * number - quantiser if number > 0 else 2 * number + quantiser
-
-
-@compiled
+@inlined
 def _update(n: int, c: int, variance: float, step: float, paths: Paths) -> None:
     """Take the paths to the next states: their costs, values and weights."""
     for state in range(N_STATES):
@@ -169,7 +177,7 @@ def _update(n: int, c: int, variance: float, step: float, paths: Paths) -> None:
         paths.changes[state] = 0.0
         if paths.costs[state] < NEVER:
             before = paths.before[c, state]
-            change = _residual(paths.numbers[c, state], before) * step
+            change = residual_of(paths.numbers[c, state], before) * step
             paths.changes[state] = change / variance
             paths.values[c, state] = paths.guesses[before] + change
         else:
@@ -185,8 +193,12 @@ def _update(n: int, c: int, variance: float, step: float, paths: Paths) -> None:
 @compiled
 def _empty_paths(n_components: int, most: int) -> Paths:
     """Memory for vectors with up to ``most`` neighbours."""
-    rows, shape = LANES * most, (n_components, LANES)
+    width, shape = in_lanes(most), (n_components, LANES)
+    costs, next_costs, guesses, changes = np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES)
+    weights, next_weights, values = np.zeros(LANES * most), np.zeros(LANES * most), np.zeros(shape)
+    numbers, before = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    products, gains, next_products, near = np.zeros(width), np.zeros(width), np.zeros(width), np.zeros(width)
     return Paths(
-        np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(rows), np.zeros(rows),
-        np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape), np.zeros((most, most)), np.zeros(most), np.zeros(most),
+        *(costs, next_costs, guesses, changes, weights, next_weights, numbers, before, values),
+        *(np.zeros(most * width), products, gains, next_products, near),
     )
