@@ -115,7 +115,7 @@ def reduce_trajectories(
         noise: squared error of decoded coefficients, in that of rounding them to the step.
         most: components, whatever pays.
         n_axes: coordinates of a frame; 3 in all formulas here stands for it.
-        penalty: of the basis' bits, on a trellis (`gvpipe.trajectory.coefficient_coding`); then ``noise`` is that of the basis, too.
+        penalty: of a bit of the basis, on a trellis (`gvpipe.trajectory.coefficient_coding`); ``noise`` is the basis', too.
     """
     n_points, n_coordinates = trajectories.shape
     principal = find_principal(trajectories, error)

@@ -14,7 +14,7 @@ which picks one of `N_CONTEXTS` frequency tables::
               (`gvpipe.entropy.block_coder`): for every block of vectors, every component's residuals
     level   = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
 
-Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] 0, then words, and
+Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] 0, then words;
 its tables learn (`gvpipe.trajectory.trellis_coding`).
 """
 

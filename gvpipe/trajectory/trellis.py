@@ -1,9 +1,9 @@
 """Trellis coded quantisation of residuals: two quantisers of double steps, and a state machine that says which comes next.
 
-A residual r counts steps of ``FINENESS`` of the step asked for. In a state of quantiser 0 it is even, ``r = 2 k``; in a state of
-quantiser 1 it is odd or 0, ``r = 2 k - sign(k)``. The integer k is what is coded. Its parity leads to the next state, and the
-quantiser of a state is its lowest bit. Each vector starts in state 0; its components follow in order. So each residual is coded
-as cheaply as with double steps, and a path of residuals comes closer than double steps would: the encoder searches for it
+A residual r counts fine steps, each `FINENESS` of the step asked for. In a state of quantiser 0 it is even, ``r = 2 k``. In a
+state of quantiser 1 it is odd or 0, ``r = 2 k - sign(k)``. The integer k is what is coded. Its parity leads to the next state,
+and the quantiser of a state is its lowest bit. Each vector starts in state 0; its components follow in order. So an integer
+costs what double steps cost, and a path of residuals comes closer than these would. The encoder searches for the path
 (`gvpipe.trajectory.trellis_search`).
 
 Sources: M. W. Marcellin and T. R. Fischer, "Trellis Coded Quantization of Memoryless and Gauss-Markov Sources", 1990, with both

@@ -28,8 +28,8 @@ def code_residuals(
     """Code residuals block by block and component by component.
 
     Args:
-        residuals, inputs, stream: all blocks up to ``first_block`` are coded. To encode, ``ranked`` has the integers k, and keeps
-            them; decoding fills it with residuals r.
+        residuals, inputs, stream: all blocks up to ``first_block`` are coded. To encode, ``ranked`` has the integers k, and
+            keeps them; decoding fills it with residuals r.
         first_block, end_block: which blocks to code.
         encodes: or decodes.
 

@@ -1,11 +1,11 @@
 """The encoder's search for residuals on the trellis (`gvpipe.trajectory.trellis`): of all paths the cheapest, vector by vector.
 
-What: Viterbi's algorithm over a vector's components. A path's cost is its squared error, in squared fine steps, and `PENALTY` for
-every bit. In closed loop: each path has the weights of the ``kalman`` predictor that follow from its own residuals. Their
-covariances are those of all paths, since they follow from the neighbours alone.
+What: Viterbi's algorithm over a vector's components. A path's cost is its squared error, in squared fine steps, and a penalty
+for every bit. The loop is closed: each path has the weights of the ``kalman`` predictor that follow from its own residuals.
+Their covariances are those of all paths, since they follow from the neighbours alone.
 
-Bits come from the contexts' first tables, contexts from residuals of plain rounding, which hardly differ. A cost must be less by
-`MARGIN` to win, so that rounding of the input on other machines decides nothing.
+Bits come from the contexts' first tables, contexts from residuals of plain rounding, which hardly differ. A cost must be less
+by a margin to win, so that rounding of the input on other machines decides nothing.
 """
 
 from __future__ import annotations

@@ -24,13 +24,14 @@ class Paths(NamedTuple):
     """The best path to each state, of a vector with R components and up to n neighbours.
 
     Args:
-        costs, next_costs, guesses, changes: ``(LANES,)``: so far, with the next component, its prediction, the residual times step.
+        costs, next_costs, guesses, changes: ``(LANES,)``: so far; with the next component; its prediction; by how much that is
+            off, over its variance.
         weights, next_weights: n rows.
         numbers, before: ``(R, LANES)``: the integer k of a component, and the state that it came from.
         values: ``(R, LANES)``: what is decoded.
         covariances: n rows of n, or of the next multiple of LANES: of the weights, for all paths.
-        products, gains, next_products, near: as long as such a row: covariances times the neighbours' values of a component, the
-            same over its variance, the products to come, these values.
+        products, gains, next_products, near: as long as such a row: covariances times the neighbours' values of a component,
+            the same over its variance, the products to come, these values.
     """
 
     costs: Float64
