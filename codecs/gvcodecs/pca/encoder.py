@@ -29,7 +29,7 @@ from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.mesh.hierarchy_kernels import Hierarchy
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.runtime.segment_map import map_segments
-from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
+from gvpipe.trajectory.basis import MAX_COMPONENTS, THRESHOLD, Reduced, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
@@ -157,10 +157,16 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
     codec, still = segments.codec, segments.still
     start, stop = span
     error = (segments.target_error / LEFT) ** 2 * still.n_moving * (stop - start)
-    own = {"penalty": BASIS_PENALTY, "noise": NOISE, "point_cost": COST, "entry_cost": COST} if codec.on_trellis else {}
-    trajectories = read_trajectories(segments.sequence, start, stop, segments.moving)
+    noise, cost = (NOISE, COST) if codec.on_trellis else (1.0, THRESHOLD)
     reduced = reduce_trajectories(
-        trajectories, error, codec.components, most=still.most_components, **own
+        read_trajectories(segments.sequence, start, stop, segments.moving),
+        error,
+        codec.components,
+        point_cost=cost,
+        entry_cost=cost,
+        noise=noise,
+        most=still.most_components,
+        penalty=BASIS_PENALTY if codec.on_trellis else None,
     )  # the trajectories go: what follows needs as much memory again
     return _Segment(reduced.step, reduced.basis, _encode_coefficients(codec, reduced, still, segments.causal))
 
