@@ -38,6 +38,7 @@ PROFILES: dict[str, tuple[str, dict[str, Any]]] = {
     "mcgv-klt": ("mcgv", {**FAST, "transform": "klt"}),
     "mcgv-bound": ("mcgv", {**FAST, "max_error": "0.1%"}),
     "pca": ("pca", {}),
+    "pca-plain": ("pca", {"quantiser": "plain"}),
     "pca-lsp": ("pca", {"predictor": "lsp", "reorder": True}),
     "pca-bound": ("pca", {"max_error": "0.2%"}),
     "laplacian": ("laplacian", {}),

@@ -46,6 +46,7 @@ HIERARCHY = ("gvpipe.mesh.hierarchy_kernels.Hierarchy", [INTS] * 6)
 RESIDUALS = ("gvpipe.trajectory.contexts.Residuals", [NUMBERS, NUMBERS, LONGS])
 INPUTS = ("gvpipe.trajectory.contexts.ContextInputs", [INTS] * 5 + [LONGS] * 3)
 STREAM = ("gvpipe.entropy.block_kernels.BlockStream", ["uint64[1]", "uint32[1]", "uint64[2]", LONGS])
+TRELLIS = ("gvpipe.entropy.learning_kernels.LearningStream", ["uint64[1]", "uint32[1]", NUMBERS])
 VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
@@ -181,6 +182,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
     "gvpipe.trajectory.prediction_kernels.predict_lsp": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_navg": [VECTORS, SCALAR, SCALAR],
     "gvpipe.trajectory.prediction_kernels.predict_rbf": [VECTORS, SCALAR, SCALAR, "float64"],
+    "gvpipe.trajectory.trellis_kernels.code_residuals": [RESIDUALS, INPUTS, TRELLIS, SCALAR, SCALAR, "bool"],
     "gvpipe.trajectory.spatial_kernels.weigh_hierarchy": [HIERARCHY, "bool"],
     "gvpipe.trajectory.spatial_kernels.weigh_traversal": [TRIANGLES, SCALAR],
     "gvpipe.trajectory.still_kernels.fit_still": [ROWS, FLOATS, ROWS],

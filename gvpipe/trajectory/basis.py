@@ -102,6 +102,7 @@ def reduce_trajectories(
     noise: float = 1.0,
     most: int = MAX_COMPONENTS,
     n_axes: int = 3,
+    penalty: float | None = None,
 ) -> Reduced:
     """Choose the step and the components of ``trajectories (V, 3F)``, and code their basis.
 
@@ -114,15 +115,17 @@ def reduce_trajectories(
         noise: squared error of decoded coefficients, in that of rounding them to the step.
         most: components, whatever pays.
         n_axes: coordinates of a frame; 3 in all formulas here stands for it.
+        penalty: of a bit of the basis, on a trellis (`gvpipe.trajectory.coefficient_coding`); ``noise`` is the basis', too.
     """
     n_points, n_coordinates = trajectories.shape
     principal = find_principal(trajectories, error)
-    left = (noise * n_points + basis_ratio**2 * n_coordinates) / 12
+    basis_noise = basis_ratio**2 * (1.0 if penalty is None else noise)
+    left = (noise * n_points + basis_noise * n_coordinates) / 12
     step, kept = choose_step(
         principal, error, lambda step: min(most, count_components(principal, n_points, step, point_cost, entry_cost)), left
     )
     kept = min(n_components, most, len(principal.energies)) or kept
-    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio, n_axes)
+    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio, n_axes, penalty)
     return Reduced(step, data, fit_coefficients(trajectories, basis), basis)
 
 
@@ -200,14 +203,19 @@ def _coarsest(is_fine: Callable[[float], bool]) -> float:
     return float(2.0 ** (low / PER_STEP_OCTAVE))
 
 
-def encode_basis(principal: Principal, n_components: int, n_points: int, step: float, n_axes: int = 3) -> tuple[bytes, Basis]:
-    """Code the mean and the first R principal trajectories; return the bytes and what the decoder will have."""
+def encode_basis(
+    principal: Principal, n_components: int, n_points: int, step: float, n_axes: int = 3, penalty: float | None = None
+) -> tuple[bytes, Basis]:
+    """Code the mean and the first R principal trajectories; return the bytes and what the decoder will have.
+
+    ``penalty`` is that of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
+    """
     levels = np.rint(PER_OCTAVE * np.log2(np.sqrt(principal.energies[:n_components]) / step)).astype(np.int64)
     levels = np.clip(levels, -MAX_SCALE, MAX_SCALE)
     scales = _scales(levels, n_points, step)
     columns = np.column_stack([principal.mean, principal.vectors[:, :n_components]]) * scales  # (3F, 1 + R)
     order = temporal_order(len(columns) // n_axes, n_axes)
-    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), order)
+    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), order, penalty=penalty)
     head = encode_integers(np.diff(levels, prepend=0))
     decoded /= scales
     return varint(n_components) + pack_block(head) + data, Basis(decoded[:, 0], decoded[:, 1:])

@@ -13,6 +13,9 @@ which picks one of `N_CONTEXTS` frequency tables::
     vectors = [varint] bytes of the levels, levels: R integers (`gvpipe.entropy.integers`), differences; then blocks
               (`gvpipe.entropy.block_coder`): for every block of vectors, every component's residuals
     level   = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
+
+Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] 0, then words;
+its tables learn (`gvpipe.trajectory.trellis_coding`).
 """
 
 from __future__ import annotations
@@ -21,16 +24,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from gvpipe.container.cursor import Cursor, pack_block
+from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.foundation.arrays import Float64, Int32, Integers
+from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.foundation.errors import InputError
 from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
-from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, ONE, Residuals, context_inputs, level_bounds
+from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, Residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors
+from gvpipe.trajectory.trellis import FINENESS
+from gvpipe.trajectory.trellis_coding import TrellisDecoder, encode_numbers
+from gvpipe.trajectory.trellis_search import search
 
+TRELLIS = 0  # in place of the number of contexts: residuals on a trellis
 MAX_VALUES = 1 << 27  # of a section: vectors times components
 PART, MOST_PARTS = 4096, 16  # vectors whose residuals are decoded before they are predicted, about; parts of all of them
 
@@ -42,6 +49,7 @@ def encode_vectors(
     predictor: str = "kalman",
     beta: float = 1.8,
     given: Float64 | None = None,
+    penalty: float | None = None,
 ) -> tuple[bytes, Float64]:
     """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``.
 
@@ -53,23 +61,23 @@ def encode_vectors(
         beta: exponent of the radial function (rbf).
         given: ``(n, R)`` decoded vectors that ``causal`` leaves out (`gvpipe.trajectory.causal_selection.leave_out`); contexts
             take their residuals for 0.
+        penalty: of a bit, in squared fine steps, for residuals on a trellis (`gvpipe.trajectory.trellis`, ``kalman`` alone);
+            None: residuals of plain rounding.
 
     Raises:
         InputError: a value is too large for the step.
     """
+    if penalty is not None:
+        return _encode_trellis(target, step, causal, given, penalty)
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
     wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
     decoded = np.zeros(target.shape) if given is None else given.copy()
     predict_vectors(causal, step, wide, decoded, target, predictor, beta)
-    largest = max(int(wide.max(initial=0)), -int(wide.min(initial=0)))
-    if largest >= LARGEST:
-        raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
-    sums = np.array([np.abs(column).sum() for column in wide.T], np.int64)  # one at a time: a copy may be large
+    largest = _check_residuals(wide)
     residuals: Integers = wide.astype(np.int32) if largest <= np.iinfo(np.int32).max else wide
     del wide  # what follows takes as much memory again
-    means = sums * ONE // max(1, len(residuals))
-    levels = np.searchsorted(level_bounds(), means + 1, side="right") - 1
+    levels = level_of(residuals)
     contexts = find_all_contexts(residuals, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
     coder = BlockEncoder(N_CONTEXTS)
     for first, end in pairwise(causal.blocks.tolist()):
@@ -77,6 +85,17 @@ def encode_vectors(
             coder.add(residuals[first:end, c], contexts[first:end, c])
     head = encode_integers(np.diff(levels, prepend=0))
     return pack_block(head) + coder.finish(), decoded
+
+
+def _encode_trellis(
+    target: Float64, step: float, causal: CausalOrder, given: Float64 | None, penalty: float
+) -> tuple[bytes, Float64]:
+    """As `encode_vectors`, on a trellis."""
+    numbers, ranked, decoded = search(target, step, causal, given, penalty)
+    _check_residuals(ranked)
+    levels = level_of(ranked)
+    words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
+    return pack_block(encode_integers(np.diff(levels, prepend=0))) + varint(TRELLIS) + words, decoded
 
 
 def decode_vectors(
@@ -111,7 +130,10 @@ def decode_vectors(
     levels = np.cumsum(decode_integers(head, n_components, name=name))
     if ((levels < 0) | (levels > MAX_LEVEL)).any():
         raise cursor.corrupt("a magnitude level is out of range")
-    coder = BlockDecoder(cursor.rest(), N_CONTEXTS, name)
+    rest = cursor.rest()
+    on_trellis = rest[:1] == varint(TRELLIS)
+    coder = TrellisDecoder(rest[1:], name) if on_trellis else BlockDecoder(rest, N_CONTEXTS, name)
+    fine_step = step * FINENESS if on_trellis else step
     wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks
     n_vectors = int(causal.blocks[wanted])
     decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
@@ -121,15 +143,26 @@ def decode_vectors(
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
         """Decode the residuals of blocks; return which vectors these are."""
-        coder.check(decode_residuals(residuals, inputs, coder.stream, *blocks))
+        if isinstance(coder, TrellisDecoder):
+            coder.take(residuals, inputs, *blocks)
+        else:
+            coder.check(decode_residuals(residuals, inputs, coder.stream, *blocks))
         return int(causal.blocks[blocks[0]]), int(causal.blocks[blocks[1]])
 
     parts = _parts(causal.blocks[: wanted + 1])
     for begin, end in run_ahead(take, parts, len(parts), n_threads=1):  # predict while the next ones are decoded
-        predict_vectors(causal, step, ranked, decoded, None, predictor, beta, begin, end)
+        predict_vectors(causal, fine_step, ranked, decoded, None, predictor, beta, begin, end)
     if n_blocks is None:
         coder.end()
     return decoded
+
+
+def _check_residuals(residuals: Int64) -> int:
+    """Return the largest magnitude of ``residuals (m, R)``; raises `InputError` where it does not fit."""
+    largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
+    if largest >= LARGEST:
+        raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
+    return largest
 
 
 def _parts(bounds: Int32) -> list[tuple[int, int]]:

@@ -36,7 +36,7 @@ class Memory(NamedTuple):
     """For blocks of up to n vectors.
 
     Args:
-        near: ``(m, N_NEAR + 1) int32`` (`_find_near`), of blocks after the first, of up to m.
+        near: ``(m, N_NEAR + 1) int32`` (`find_near`), of blocks after the first, of up to m.
         contexts: ``(n,) int64``.
         spans: ``(2, TILE) int64`` sums of magnitudes over the short and the long span.
     """
@@ -47,7 +47,7 @@ class Memory(NamedTuple):
 
 
 @compiled
-def _new_memory(blocks: Int32, first_block: int, end_block: int) -> Memory:
+def new_memory(blocks: Int32, first_block: int, end_block: int) -> Memory:
     """Memory for blocks with these bounds."""
     n = n_later = 0
     for b in range(first_block, end_block):
@@ -82,7 +82,7 @@ def _log_of_large(value: int, inputs: ContextInputs) -> int:
 
 
 @compiled
-def _find_near(first: int, end: int, inputs: ContextInputs, near: Int32) -> None:
+def find_near(first: int, end: int, inputs: ContextInputs, near: Int32) -> None:
     """Fill ``near (n, N_NEAR + 1)``: how many causal neighbours count, 1 at least; ranks of those before ``first``, then -1.
 
     Not of the first block, which may be large, and has nothing before it.
@@ -101,13 +101,13 @@ def _find_near(first: int, end: int, inputs: ContextInputs, near: Int32) -> None
 
 
 @compiled
-def _find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInputs, before: Int64, memory: Memory) -> None:
+def find_contexts(first: int, end: int, c: int, rows: Int64, inputs: ContextInputs, before: Int64, memory: Memory) -> None:
     """Fill ``memory.contexts`` of component c in the block of ranks ``first`` to ``end``.
 
     Args:
         rows: as of `Residuals`, of the blocks before and of this block's components before c.
         before: ``(R,)`` mean magnitudes of the block before, in 1 / ONE.
-        memory: what is near is known (`_find_near`).
+        memory: what is near is known (`find_near`).
     """
     usual, own, near, contexts = inputs.usual, rows[c], memory.near, memory.contexts
     shorts, longs = memory.spans[0], memory.spans[1]
@@ -155,7 +155,7 @@ def _sum_spans(begin: int, n: int, c: int, rows: Int64, shorts: Int64, longs: In
 
 
 @compiled
-def _mean_magnitudes(rows: Int64, first: int, end: int, means: Int64) -> None:
+def mean_magnitudes(rows: Int64, first: int, end: int, means: Int64) -> None:
     """Fill ``means (R,)`` of a block of ``rows (R, m)``, in 1 / ONE, rounded up to one at least."""
     for c in range(len(means)):
         total = 0
@@ -169,7 +169,7 @@ def find_all_contexts(residuals: Integers, inputs: ContextInputs) -> UInt8:
     """``(m, R)`` contexts of ``residuals (m, R)`` by rank, all of which there are; int32, or where they do not fit, int64."""
     contexts, before = np.zeros(residuals.shape, np.uint8), inputs.usual.copy()
     rows = np.empty((residuals.shape[1], len(residuals)), np.int64)
-    _fill_contexts(residuals, inputs, before, rows, _new_memory(inputs.blocks, 0, len(inputs.blocks) - 1), contexts)
+    _fill_contexts(residuals, inputs, before, rows, new_memory(inputs.blocks, 0, len(inputs.blocks) - 1), contexts)
     return contexts
 
 
@@ -179,15 +179,15 @@ def _fill_contexts(
 ) -> None:
     for i in range(len(residuals)):
         for c in range(len(rows)):
-            rows[c, i] = _entry(int(residuals[i, c]))
+            rows[c, i] = entry(int(residuals[i, c]))
     for b in range(len(inputs.blocks) - 1):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
-        _find_near(first, end, inputs, memory.near)
+        find_near(first, end, inputs, memory.near)
         for c in range(len(rows)):
-            _find_contexts(first, end, c, rows, inputs, before, memory)
+            find_contexts(first, end, c, rows, inputs, before, memory)
             for i in range(first, end):
                 contexts[i, c] = memory.contexts[i - first]
-        _mean_magnitudes(rows, first, end, before)
+        mean_magnitudes(rows, first, end, before)
 
 
 @compiled
@@ -201,7 +201,7 @@ def decode_residuals(residuals: Residuals, inputs: ContextInputs, stream: BlockS
     Returns:
         0, or what is wrong: as of `take_block`, or OUT_OF_RANGE.
     """
-    memory = _new_memory(inputs.blocks, first_block, end_block)
+    memory = new_memory(inputs.blocks, first_block, end_block)
     numbers, ends = np.empty((3, len(memory.contexts)), np.int64), np.empty(len(stream.sizes) + 1, np.int64)
     return _decode_blocks(residuals, inputs, stream, first_block, end_block, memory, numbers, ends)
 
@@ -221,29 +221,29 @@ def _decode_blocks(
     ranked, rows, means = residuals
     for b in range(first_block, end_block):
         first, end = inputs.blocks[b], inputs.blocks[b + 1]
-        _find_near(first, end, inputs, memory.near)
+        find_near(first, end, inputs, memory.near)
         for c in range(len(rows)):
-            _find_contexts(first, end, c, rows, inputs, means, memory)
+            find_contexts(first, end, c, rows, inputs, means, memory)
             status = fill_block(stream, memory.contexts[: end - first], numbers, ends)
             if status:
                 return status
             for i in range(end - first):
                 if abs(numbers[0, i]) >= LARGEST:
                     return OUT_OF_RANGE
-                rows[c, first + i] = _entry(numbers[0, i])
-        _mean_magnitudes(rows, first, end, means)
-        _rank(rows, first, end, ranked)
+                rows[c, first + i] = entry(numbers[0, i])
+        mean_magnitudes(rows, first, end, means)
+        rank_residuals(rows, first, end, ranked)
     return 0
 
 
 @compiled
-def _entry(residual: int) -> int:
+def entry(residual: int) -> int:
     """What `Residuals.rows` has of a residual."""
     return abs(residual) << ENTRY_BITS | (residual < 0)
 
 
 @compiled
-def _rank(rows: Int64, first: int, end: int, ranked: Int64) -> None:
+def rank_residuals(rows: Int64, first: int, end: int, ranked: Int64) -> None:
     """Fill ranks ``first`` to ``end`` of ``ranked (m, R)`` from ``rows (R, m)``, few at a time, which stay in the cache."""
     for begin in range(first, end, FEW):
         for c in range(len(rows)):

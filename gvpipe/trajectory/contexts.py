@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Int32, Int64
+from gvpipe.foundation.arrays import Int32, Int64, Integers
 from gvpipe.trajectory.causal_order import CausalOrder
 
 SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first
@@ -96,3 +96,10 @@ def _logs() -> Int64:
 def level_bounds() -> Int64:
     """``(MAX_LEVEL + 1,)``: 2 ** (level / 4) rounded down, exactly."""
     return np.array([math.isqrt(math.isqrt(1 << level)) for level in range(MAX_LEVEL + 1)], np.int64)
+
+
+def level_of(residuals: Integers) -> Int64:
+    """Levels ``(R,)`` of the components' mean magnitudes in ``residuals (m, R)`` (`level_bounds`)."""
+    sums = np.array([np.abs(column).sum() for column in residuals.T], np.int64)  # one at a time: a copy may be large
+    means = sums * ONE // max(1, len(residuals))
+    return np.searchsorted(level_bounds(), means + 1, side="right").astype(np.int64) - 1

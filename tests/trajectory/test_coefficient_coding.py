@@ -26,12 +26,29 @@ def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
     assert 8 * len(data) < 0.6 * target.size * np.log2(np.abs(target).mean() / 0.01)
 
 
-def test_parts_that_are_decoded_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trellis_takes_fewer_bits_at_the_same_error() -> None:
+    rng = np.random.default_rng(4)
+    target = rng.normal(0, 3, (600, 9)).cumsum(axis=0) * 0.6 ** np.arange(9)
+    causal = temporal_order(200)
+
+    def rate_and_error(step: float, penalty: float | None) -> tuple[int, float]:
+        data, decoded = encode_vectors(target, step, causal, penalty=penalty)
+        assert np.allclose(decode_vectors(data, 9, step, causal, "x"), decoded, rtol=0, atol=1e-6 * step)
+        return len(data), float(((target - decoded) ** 2).mean())
+
+    size, error = rate_and_error(0.1, None)
+    finer, less = rate_and_error(0.083, 0.2)
+    assert less < error
+    assert finer < size
+
+
+@pytest.mark.parametrize("penalty", [None, 0.2])
+def test_parts_that_are_decoded_ahead(penalty: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many vectors are decoded before they are predicted, the values are the same to the bit; damage is found."""
     rng = np.random.default_rng(3)
     causal = temporal_order(200)
     target = rng.normal(0, 3, (600, 9)).cumsum(axis=0)
-    data, _ = encode_vectors(target, 0.01, causal)
+    data, _ = encode_vectors(target, 0.01, causal, penalty=penalty)
     whole = decode_vectors(data, 9, 0.01, causal, "x")
     assert len(causal.blocks) > 4
     for part in (1, 50, 130, 599):

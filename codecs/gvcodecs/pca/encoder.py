@@ -29,7 +29,7 @@ from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.mesh.hierarchy_kernels import Hierarchy
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.runtime.segment_map import map_segments
-from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
+from gvpipe.trajectory.basis import MAX_COMPONENTS, THRESHOLD, Reduced, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
@@ -37,6 +37,9 @@ from gvpipe.trajectory.coefficient_coding import encode_vectors
 from gvpipe.trajectory.prediction import PREDICTORS
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 
+QUANTISERS = ("trellis", "plain")
+BASIS_PENALTY, PENALTY = 0.25, 0.22  # of a bit on a trellis, in squared fine steps (`gvpipe.trajectory.trellis_search`)
+NOISE, COST = 1.15, 0.22  # on a trellis: squared error in that of rounding to the step; of a component (`count_components`)
 LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
 
 
@@ -62,6 +65,7 @@ class Pca(BaseCodec):
     quality: float = 75.0  # 0..100, higher is better
     predictor: str = "kalman"  # kalman, or the paper's rbf, lsp, navg
     beta: float = 1.8  # exponent of rbf's radial function, 0.1..1.99
+    quantiser: str = "trellis"  # trellis, or plain: larger, sooner; predictors but kalman have plain alone
     components: int = 0  # principal trajectories per segment, 1..16384; 0: as many as pay
     segment: int = 500  # most frames per segment, 1..100000
     reorder: bool = False  # true: the codec may choose the vertex order; smaller
@@ -70,8 +74,14 @@ class Pca(BaseCodec):
         self.check_range(0, 100, "quality")
         self.check_choice("predictor", PREDICTORS)
         self.check_range(0.1, 1.99, "beta")
+        self.check_choice("quantiser", QUANTISERS)
         self.check_range(0, MAX_COMPONENTS, "components")
         self.check_range(1, MAX_SEGMENT, "segment")
+
+    @property
+    def on_trellis(self) -> bool:
+        """Whether residuals are chosen on a trellis."""
+        return self.quantiser == "trellis" and self.predictor == "kalman"
 
     def _encode(self, sequence: MeshSequence, report: Progress, memo: Memo) -> Encoded:
         shared = code_connectivity(sequence, self.reorder, memo, report)
@@ -147,8 +157,16 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
     codec, still = segments.codec, segments.still
     start, stop = span
     error = (segments.target_error / LEFT) ** 2 * still.n_moving * (stop - start)
+    noise, cost = (NOISE, COST) if codec.on_trellis else (1.0, THRESHOLD)
     reduced = reduce_trajectories(
-        read_trajectories(segments.sequence, start, stop, segments.moving), error, codec.components, most=still.most_components
+        read_trajectories(segments.sequence, start, stop, segments.moving),
+        error,
+        codec.components,
+        point_cost=cost,
+        entry_cost=cost,
+        noise=noise,
+        most=still.most_components,
+        penalty=BASIS_PENALTY if codec.on_trellis else None,
     )  # the trajectories go: what follows needs as much memory again
     return _Segment(reduced.step, reduced.basis, _encode_coefficients(codec, reduced, still, segments.causal))
 
@@ -159,4 +177,5 @@ def _encode_coefficients(codec: Pca, reduced: Reduced, still: StillPoints, causa
     if codec.predictor == "lsp":  # section 3.4: the small ones first
         wanted = np.ascontiguousarray(wanted[:, ::-1])
         given = None if given is None else np.ascontiguousarray(given[:, ::-1])
-    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given)[0]
+    penalty = PENALTY if codec.on_trellis else None
+    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given, penalty)[0]

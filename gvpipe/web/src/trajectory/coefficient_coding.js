@@ -5,14 +5,17 @@
 
 import {
   COEFFICIENT_CODING_MAX_VALUES as MAX_VALUES,
+  COEFFICIENT_CODING_TRELLIS as TRELLIS,
   CONTEXTS_MAX_LEVEL as MAX_LEVEL,
   CONTEXTS_N_CONTEXTS as N_CONTEXTS,
   CONTEXTS_PER_OCTAVE as PER_OCTAVE,
+  TRELLIS_FINENESS as FINENESS,
 } from "../constants.js";
 import { BlockStream } from "../format/block_stream.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
 import { powersOfTwo } from "./exact_powers.js";
+import { TrellisStream } from "./trellis_stream.js";
 
 export { MAX_VALUES };
 
@@ -50,7 +53,9 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
     if (level < 0 || level > MAX_LEVEL) throw cursor.corrupt("a magnitude level is out of range");
     usual[c] = tables.levels[level];
   }
-  const stream = new BlockStream(kernels, cursor.rest(), N_CONTEXTS, name);
+  const rest = cursor.rest();
+  const onTrellis = rest[0] === TRELLIS;
+  const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const wanted = blocks ?? bounds.shape[0] - 1;
   const decoded = given ?? kernels.array("float64", [n, components]);
   const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
@@ -58,12 +63,13 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const residuals = kernels.array("int64", [vectors, components]);
   const known = [residuals, kernels.array("int64", [components, vectors]), kernels.array("int64", [components], usual)];
   for (let b = 0; b < wanted; b++) {
-    stream.check(kernels.call("decode_residuals", ...known, ...inputs, ...stream.arrays, b, b + 1)[0]);
+    const given = [...known, ...inputs, ...stream.arrays, b, b + 1];
+    stream.check((onTrellis ? kernels.call("code_residuals", ...given, false) : kernels.call("decode_residuals", ...given))[0]);
     yield;
   }
   if (blocks === null) stream.end();
   const target = kernels.array("float64", [0, 0]);
-  const coding = [...causal, step, residuals, decoded, target];
+  const coding = [...causal, onTrellis ? step * FINENESS : step, residuals, decoded, target];
   const last = predictor === "rbf" ? [beta] : [];
   yield* blockSteps(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
   kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...known, target);

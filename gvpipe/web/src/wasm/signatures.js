@@ -59,6 +59,7 @@ export const SIGNATURES = {
   predict_lsp: {"given": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool", "float64", "int64[2]", "float64[2]", "float64[2]", "int64", "int64"], "returned": []},
   predict_navg: {"given": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool", "float64", "int64[2]", "float64[2]", "float64[2]", "int64", "int64"], "returned": []},
   predict_rbf: {"given": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool", "float64", "int64[2]", "float64[2]", "float64[2]", "int64", "int64", "float64"], "returned": []},
+  code_residuals: {"given": ["int64[2]", "int64[2]", "int64[1]", "int32[1]", "int32[1]", "int32[1]", "int32[1]", "int32[1]", "int64[1]", "int64[1]", "int64[1]", "uint64[1]", "uint32[1]", "int64[2]", "int64", "int64", "bool"], "returned": ["int64"]},
   weigh_hierarchy: {"given": ["int32[1]", "int32[1]", "int32[1]", "int32[1]", "int32[1]", "int32[1]", "bool"], "returned": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool"]},
   weigh_traversal: {"given": ["int32[2]", "int64"], "returned": ["int32[1]", "int32[1]", "int32[1]", "float64[1]", "float64[1]", "int32[1]", "int32[1]", "bool"]},
   fit_still: {"given": ["float64[2]", "float64[1]", "float64[2]"], "returned": ["float64[2]"]},

@@ -1,0 +1,47 @@
+"""Trellis coded quantisation of residuals: two quantisers of double steps, and a state machine that says which comes next.
+
+A residual r counts fine steps, each `FINENESS` of the step asked for. In a state of quantiser 0 it is even, ``r = 2 k``. In a
+state of quantiser 1 it is odd or 0, ``r = 2 k - sign(k)``. The integer k is what is coded. Its parity leads to the next state,
+and the quantiser of a state is its lowest bit. Each vector starts in state 0; its components follow in order. So an integer
+costs what double steps cost, and a path of residuals comes closer than these would. The encoder searches for the path
+(`gvpipe.trajectory.trellis_search`).
+
+Sources: M. W. Marcellin and T. R. Fischer, "Trellis Coded Quantization of Memoryless and Gauss-Markov Sources", 1990, with both
+quantisers holding 0 as in the dependent quantisation of VVC (H. Schwarz et al., "Hybrid Video Coding with Trellis-Coded
+Quantization", 2019). The code of eight states is that of G. Ungerboeck, "Channel Coding with Multilevel/Phase Signals", 1982,
+table I (parity checks 13 and 04, octal).
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from gvpipe.entropy import parametric_tables
+from gvpipe.entropy.tokens import MAX_TOKENS
+from gvpipe.foundation.arrays import Int64
+from gvpipe.trajectory.contexts import N_CONTEXTS
+
+FINENESS = 21 / 32  # of a step
+N_STATES, N_QUANTISERS = 8, 2
+FEEDBACK, PARITY = 5, 2  # of the code: state s leads to ``(s >> 1) ^ FEEDBACK (s & 1) ^ PARITY (k & 1)``
+ZEROS = (  # first tables (`parametric_tables.table`): of each quantiser, by the context of the forecast
+    (255, 255, 254, 252, 247, 242, 235, 224, 206, 184, 152, 118, 88, 66, 49, 35, 26, 19, 14, 10, 8, 7, 6, 5, 4, 3, 2),
+    (255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1),
+)
+SHAPES = (0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 6, 8, 10, 12, 14, 17, 19, 21, 23, 24, 25, 26, 27, 28, 29)
+
+
+@functools.cache
+def _first_tables() -> Int64:
+    tables = np.ones((N_CONTEXTS, N_QUANTISERS, MAX_TOKENS), np.int64)
+    for context, shape in enumerate(SHAPES):
+        for quantiser, zeros in enumerate(ZEROS):
+            tables[context, quantiser, : parametric_tables.N_TOKENS] = parametric_tables.table(zeros[context], shape)
+    return tables.reshape(N_CONTEXTS * N_QUANTISERS, MAX_TOKENS)
+
+
+def first_tables() -> Int64:
+    """Frequencies ``(54, MAX_TOKENS)`` that the contexts begin with; context 2 c + q is c with quantiser q."""
+    return _first_tables().copy()

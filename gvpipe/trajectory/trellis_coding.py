@@ -1,0 +1,66 @@
+"""Integers of trellis coded residuals (`gvpipe.trajectory.trellis`) as range-coded words; tables learn, so none are sent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gvpipe.container.cursor import Cursor
+from gvpipe.foundation.arrays import Int64
+from gvpipe.trajectory.contexts import ContextInputs, Residuals
+from gvpipe.trajectory.trellis import first_tables
+
+
+def encode_numbers(numbers: Int64, inputs: ContextInputs) -> bytes:
+    """Return the words of the integers ``numbers (m, R)``, by rank, of all blocks of ``inputs``."""
+    from gvpipe.entropy import range_encoder
+    from gvpipe.entropy.learning_kernels import LearningStream
+    from gvpipe.trajectory.trellis_kernels import code_residuals
+
+    m, n_components = numbers.shape
+    residuals = Residuals(numbers, np.zeros((n_components, m), np.int64), inputs.usual.copy())
+    state, words, tables = range_encoder.start(), np.zeros(0, np.uint32), first_tables()
+    for b in range(len(inputs.blocks) - 1):
+        room = range_encoder.MOST_WORDS * n_components * int(inputs.blocks[b + 1] - inputs.blocks[b]) + 1
+        words = np.concatenate([words[: int(state[2])], np.zeros(room, np.uint32)])
+        code_residuals(residuals, inputs, LearningStream(state, words, tables), b, b + 1, True)
+    return range_encoder.finish(state, words).astype("<u4").tobytes()
+
+
+class TrellisDecoder:
+    """Mirror of `encode_numbers`.
+
+    Args:
+        data: the words.
+        name: of the section, for messages.
+
+    Raises:
+        CorruptFile: these are no whole words.
+    """
+
+    def __init__(self, data: bytes, name: str) -> None:
+        from gvpipe.entropy import range_decoder
+        from gvpipe.entropy.learning_kernels import LearningStream
+
+        self._cursor = Cursor(data, name)
+        if len(data) % 4:
+            raise self._cursor.corrupt("its words are not whole")
+        words = np.frombuffer(data, "<u4").astype(np.uint32)
+        self._stream = LearningStream(range_decoder.start(words), words, first_tables())
+
+    def take(self, residuals: Residuals, inputs: ContextInputs, first_block: int, end_block: int) -> None:
+        """Decode residuals of blocks, those before ``first_block`` being done; raises `CorruptFile` if they do not decode."""
+        from gvpipe.entropy.block_kernels import OUT_OF_RANGE
+        from gvpipe.trajectory.trellis_kernels import code_residuals
+
+        status = code_residuals(residuals, inputs, self._stream, first_block, end_block, False)
+        if status == OUT_OF_RANGE:
+            raise self._cursor.corrupt("a residual is out of range")
+        if status:
+            raise self._cursor.corrupt("its range-coded data do not decode")
+
+    def end(self) -> None:
+        """Check that no word is left."""
+        from gvpipe.entropy import range_decoder
+
+        if not range_decoder.may_be_exhausted(self._stream.state, self._stream.words):
+            raise self._cursor.corrupt("range-coded data are left over")

@@ -1,0 +1,58 @@
+"""The encoder's search for residuals on the trellis (`gvpipe.trajectory.trellis`): of all paths the cheapest, vector by vector.
+
+What: Viterbi's algorithm over a vector's components. A path's cost is its squared error, in squared fine steps, and a penalty
+for every bit. The loop is closed: each path has the weights of the ``kalman`` predictor that follow from its own residuals.
+Their covariances are those of all paths, since they follow from the neighbours alone.
+
+Bits come from the contexts' first tables, contexts from residuals of plain rounding, which hardly differ. A cost must be less
+by a margin to win, so that rounding of the input on other machines decides nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from gvpipe.entropy.tokens import N_EXTRA, tokenise
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.contexts import context_inputs, level_of
+from gvpipe.trajectory.prediction import predict_vectors
+from gvpipe.trajectory.trellis import FINENESS, first_tables
+
+N_PRICED = 64  # magnitudes that have a price of their own
+PRICE_ONE = 1024  # prices are whole 1 / PRICE_ONE bits
+
+
+def search(
+    target: Float64, step: float, causal: CausalOrder, given: Float64 | None, penalty: float
+) -> tuple[Int64, Int64, Float64]:
+    """Return the integers k and the residuals r, both ``(m, R)`` by rank, and what they decode to ``(n, R)``.
+
+    Args:
+        target, causal, given: as of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
+        step: of plain rounding, in the unit of the components.
+        penalty: of a bit, in squared fine steps.
+    """
+    from gvpipe.trajectory.context_kernels import find_all_contexts
+    from gvpipe.trajectory.prediction_kernels import VectorCoding
+    from gvpipe.trajectory.trellis_search_kernels import search_paths
+
+    shape = len(causal.order), target.shape[1]
+    plain, residuals = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    decoded, found = (np.zeros(target.shape) if given is None else given.copy() for _ in range(2))
+    predict_vectors(causal, step, plain, decoded, target, "kalman", 0.0)
+    fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
+    inputs = context_inputs(causal, len(target), level_of(fine), len(causal.blocks) - 1)
+    coding = VectorCoding(causal, step * FINENESS, residuals, found, target)
+    return search_paths(coding, find_all_contexts(fine, inputs), _prices(), penalty), residuals, found
+
+
+@functools.cache
+def _prices() -> Float64:
+    """Bits ``(54, N_PRICED)`` of magnitudes of k in each context, the sign counted."""
+    tables = first_tables()
+    tokens, _, _ = tokenise(np.arange(N_PRICED))
+    bits = np.log2(tables.sum(axis=1, keepdims=True)) - np.log2(tables[:, tokens]) + N_EXTRA[tokens]
+    return np.asarray(np.rint(PRICE_ONE * bits) / PRICE_ONE)
