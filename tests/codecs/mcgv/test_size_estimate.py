@@ -19,5 +19,5 @@ def test_an_estimate_is_near_the_size() -> None:
         guess = estimate_sequence(codec, sequence, 1e9, memo=memo)
         assert guess is not None and 0.7 * size < guess < 1.4 * size
     low = estimate_sequence(Mcgv(quality=60.0, transform="klt", preset="ultrafast"), sequence, 1.0, memo=memo)
-    assert low is not None and guess is not None and 1.0 < low < guess  # no pictures are coded where it is clear that the file takes more
+    assert low is not None and guess is not None and 1.0 < low < guess  # no pictures: the file is too large without
     assert estimate_sequence(Mcgv(prediction="affine"), sequence, 1e9) is None
