@@ -67,7 +67,7 @@ def meet(
             f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
         )
         return Choice(trial, trials, tried, reason)
-    trials = Trials(codec, sequence, None, progress, asset, is_bare)
+    trials = Trials(codec, sequence, target.largest, progress, asset, is_bare)
     attempt = trials if target.measure == "bpvf" else _GivingUp(trials, target, most)
     trial, tried = find_quality(attempt, target, _start(target, codec, sequence))
     found = target.of(trial)

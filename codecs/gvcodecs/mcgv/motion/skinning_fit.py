@@ -112,7 +112,7 @@ def _search(
         if not target_error or not left > 0 or abs(math.log(AIM * target_error / left)) < CLOSE:
             break
         step *= min(max((AIM * target_error / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
-    if not n_clusters and not is_found:
+    if target_error and not n_clusters and not is_found:  # a fit for a step is an estimate, or the first of two
         best = _regrow(problem, best, 1)
     (last,) = _try_all(problem, [best], LAST_PASSES)
     return min(best, last, key=lambda trial: trial.cost).fitted, step
