@@ -141,6 +141,15 @@ def encode_sequence(
     return Encoded(add_repeated_frames(encoded.bitstream, holds), encoded.permutation)
 
 
+def estimate_sequence(
+    codec: Codec, sequence: MeshSequence, most: float, progress: Progress | None = None, memo: Memo | None = None
+) -> float | None:
+    """What `Codec.estimate_bytes` returns; repeated frames are left out, as by `encode_sequence`."""
+    memo = memo or Memo()
+    holds = memo("holds", lambda: find_repeated_frames(sequence)) if codec.holds else None
+    return codec.estimate_bytes(sequence if holds is None else holds.distinct(sequence), most, progress, memo)
+
+
 def check_mapped(codecs: Codec | Sequence[Codec]) -> None:
     """Raise `SettingError` unless the segments of all these codecs can be coded elsewhere (`gvpipe.runtime.segment_map`)."""
     for codec in [codecs] if isinstance(codecs, Codec) else codecs:

@@ -1,43 +1,40 @@
 """The codec, with its settings, that meets a target with the smallest file.
 
-1. Every candidate meets the target roughly on the sequence's first frames.
-2. Its size for all frames is estimated: shared + per_frame * (error / target)^ELASTICITY * F / SAMPLE. Sections named
-   ``NAME.N`` and the video are per frame, the others shared. For a target in bits, its error at that size is estimated.
-3. The candidates with the smallest estimates encode all frames.
-4. The smallest file is kept; for a target in bits, the one with the smallest error. Estimates of short and small sequences are
-   encodes of all frames, so the best of them counts, too.
+1. The cheapest candidate (`Codec.effort`) meets the target. It is what the others are compared with.
+2. The others are estimated at its quality, as if at its error (`size_estimates`).
+3. They meet the target, the smallest estimate first, as long as one may be the smallest: its estimate is at most `CLOSE` times
+   the smallest file so far, or `CLOSE_BOUND` times where corrections keep a bound. Estimates of one codec with several
+   settings err alike. So where that codec has a file, they are mended by it, and `ALIKE` takes the place of `CLOSE`.
+4. The smallest file is kept; for a target in bits, the one with the smallest error.
 
-Estimates of one codec with several settings err alike where the first frames differ from the others. So two codecs encode a
-longer sequence.
+A candidate whose first encode is too large to become the smallest gives up.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, cast
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from gvpipe.coding.codec import Codec
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rate_control.purposes import describe
-from gvpipe.rate_control.search import Choice, meet
+from gvpipe.rate_control.purposes import describe, own_settings
+from gvpipe.rate_control.search import Choice, TooLarge, meet
+from gvpipe.rate_control.size_estimates import SizeEstimates
 from gvpipe.rate_control.targets import Target
 from gvpipe.rate_control.trials import Trial
 
 if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
     from gvpipe.asset_coding.encoder import AssetCoder
 
-SAMPLE = 100  # frames of an estimate
-ELASTICITY = 0.45  # bytes per frame are about proportional to the error to minus this power
-CLOSE = 1.08  # times the best estimate: another candidate that may be the smallest
-KEPT = 1 << 20  # vertices times frames, up to which estimates are kept: what their searches know takes memory
+CLOSE = 1.1  # times the smallest file: larger estimates are not encoded. Estimates of mcgv were 0.85 to 1.06 times its files
+CLOSE_BOUND = 1.2  # the same with a bound: errors of some codecs have longer tails, which take more corrections
+ALIKE = 1.03  # the same of two settings of one codec
 FEW = 2  # candidates that need no estimate
-MOST = 3  # candidates that encode all frames, where there are estimates
 
 
 def default_target(codecs: Sequence[Codec]) -> Target:
@@ -64,81 +61,98 @@ def choose_codec(
         is_bare: whether the file will be of the bare layout.
 
     Returns:
-        The choice; its ``tried`` has the encodes of the whole sequence, of all finalists.
+        The choice; its ``tried`` has the encodes of the whole sequence, of all that were not given up.
 
     Raises:
         InputError: no codec meets the target; the message says why.
     """
-    ranking, estimates, n_finalists = list(codecs), "", len(codecs)
-    whole: list[Choice] = []  # estimates that are encodes of all there is
-    if len(codecs) > FEW:
-        is_small = sequence.n_frames <= SAMPLE and sequence.n_frames * sequence.n_vertices <= KEPT
-        keep = whole.append if is_small and (asset is None or asset.is_empty) else None
-        costs = [_estimate(codec, sequence, target, progress, is_bare, keep) for codec in codecs]
-        costs.sort(key=lambda item: item[0])
-        chosen = _finalists(costs, sequence.n_frames > SAMPLE)
-        ranking = [*chosen, *(codec for _, codec in costs if codec not in chosen)]
-        n_finalists = len(chosen)
-        unit = "KG" if target.measure == "bpvf" else "bytes"
-        estimates = f"; estimates ({unit}): {', '.join(f'{describe(codec)} {cost:.4g}' for cost, codec in costs)}"
+    task = _Task(sequence, target, progress, asset, is_bare)
     finalists: list[Choice] = []
-    failures = []
-    for codec in ranking:
-        if len(finalists) < n_finalists:
-            try:
-                finalists.append(meet(target, codec, sequence, progress, asset=asset, is_bare=is_bare))
-            except InputError as exc:
-                failures.append(str(exc))
-    finalists += sorted(whole, key=lambda choice: _cost(choice.trial, target))[:1]
+    failures: list[str] = []
+    left = sorted(codecs, key=lambda codec: codec.effort)
+    while left and not finalists:
+        _try(task, left.pop(0), math.inf, finalists, failures)
     if not finalists:
         raise InputError(f"no codec meets the target: {'; '.join(dict.fromkeys(failures))}")
-    best = min(finalists, key=lambda choice: _cost(choice.trial, target))
+    reference = finalists[0].trial
+    estimates = [(0.0, codec) for codec in left]
+    if len(codecs) > FEW:
+        estimates = _estimate_all(task, left, reference)
+    for estimate, codec in sorted(estimates, key=lambda item: item[0]):
+        expected, close = _mended(estimate, codec, estimates, finalists[1:]) or (estimate, task.close)
+        most = close * min(choice.trial.own_bytes for choice in finalists)
+        if expected <= most:
+            _try(task, codec, most if estimate else math.inf, finalists, failures)
+    return _best(task, finalists, failures, [(float(reference.own_bytes), reference.codec), *estimates])
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What all candidates are given; see `choose_codec`."""
+
+    sequence: MeshSequence
+    target: Target
+    progress: Progress | None
+    asset: AssetCoder | None
+    is_bare: bool
+
+    @property
+    def close(self) -> float:
+        """How many times the smallest file an estimate may be."""
+        return CLOSE_BOUND if self.target.measure == "max" else CLOSE
+
+    def cost(self, choice: Choice) -> float:
+        """What to minimise: bytes; for a target in bits the KG error."""
+        trial = choice.trial
+        return (trial.errors.kg or 0.0) if self.target.measure == "bpvf" else float(trial.bytes)
+
+
+def _try(task: _Task, codec: Codec, most: float, finalists: list[Choice], failures: list[str]) -> None:
+    """Meet the target with a codec, and note it, unless positions take more than ``most`` bytes."""
+    try:
+        finalists.append(meet(task.target, codec, task.sequence, task.progress, most, asset=task.asset, is_bare=task.is_bare))
+    except InputError as exc:
+        failures.append(str(exc))
+    except TooLarge:
+        pass
+
+
+def _estimate_all(task: _Task, codecs: Sequence[Codec], reference: Trial) -> list[tuple[float, Codec]]:
+    """Each codec's estimate; ends early where it is clear that another one is smaller."""
+    sizes = SizeEstimates(task.sequence, reference, task.progress, task.is_bare)
+    estimates: list[tuple[float, Codec]] = []
+    smallest = float(reference.own_bytes)
+    for codec in codecs:
+        estimates.append((sizes.of(codec, task.close * smallest), codec))
+        smallest = min(smallest, estimates[-1][0])
+    return estimates
+
+
+def _mended(
+    estimate: float, codec: Codec, estimates: Sequence[tuple[float, Codec]], finalists: Sequence[Choice]
+) -> tuple[float, float] | None:
+    """An estimate by what the codec's last file took beside its own one, and `ALIKE`; None without file or estimate."""
+    for choice in reversed(finalists):
+        own = choice.trial.codec
+        if own.id == codec.id:
+            before = next(
+                value for value, other in estimates if other.id == own.id and own_settings(other) == own_settings(own)
+            )
+            return (estimate * choice.trial.own_bytes / before, ALIKE) if before else None
+    return None
+
+
+def _best(
+    task: _Task, finalists: Sequence[Choice], failures: Sequence[str], estimates: Sequence[tuple[float, Codec]]
+) -> Choice:
+    """The best of the finalists, and why it is."""
+    best = min(finalists, key=task.cost)
     others = ", ".join(_describe(choice.trial) for choice in finalists if choice is not best)
     beside = f"; beside it: {others or 'no other codec meets the target'}" if others or failures else ""
-    reason = f"{_describe(best.trial)}; {best.reason}{beside}{estimates}"
+    costs = ", ".join(f"{describe(codec)} {cost:.4g}" for cost, codec in sorted(estimates, key=lambda item: item[0]))
+    listed = f"; estimates (bytes): {costs}" if len(estimates) > FEW else ""
+    reason = f"{_describe(best.trial)}; {best.reason}{beside}{listed}"
     return Choice(best.trial, best.trials, [trial for choice in finalists for trial in choice.tried], reason)
-
-
-def _finalists(costs: list[tuple[float, Codec]], is_part: bool) -> list[Codec]:
-    """The candidates that encode all frames; ``costs`` are sorted, and estimated from some frames if ``is_part``."""
-    close = [codec for cost, codec in costs if cost <= CLOSE * costs[0][0]][:MOST]
-    rival = next((codec for _, codec in costs if codec.id != close[0].id), None)
-    if is_part and rival and rival not in close:
-        close = [*close[: MOST - 1], rival]
-    return close
-
-
-def _estimate(
-    codec: Codec,
-    sequence: MeshSequence,
-    target: Target,
-    progress: Progress | None,
-    is_bare: bool,
-    keep: Callable[[Choice], None] | None,
-) -> tuple[float, Codec]:
-    """The estimated cost (infinity: it does not meet the target), and the settings at the quality that met it.
-
-    ``keep`` is called with an estimate that meets the target.
-    """
-    n_sample = min(SAMPLE, sequence.n_frames)
-    try:
-        choice = meet(target, codec, sequence.part(0, n_sample).bare(), progress, is_rough=True, is_bare=is_bare)
-    except InputError:
-        return float("inf"), codec
-    if keep:
-        keep(choice)
-    trial, quality = choice.trial, choice.trial.codec.quality
-    better = cast("Codec", dataclasses.replace(cast("DataclassInstance", codec), quality=quality))
-    if target.measure == "bpvf":
-        return _cost(trial, target) * (trial.bpvf / target.value) ** (1 / ELASTICITY), better
-    shared = sum(len(data) for name, data in trial.bitstream.sections.items() if not name[-1].isdigit())
-    off = 1.0 if target.measure == "max" else target.of(trial) / target.value
-    return shared + (trial.bytes - shared) * off**ELASTICITY * sequence.n_frames / n_sample, better
-
-
-def _cost(trial: Trial, target: Target) -> float:
-    """What to minimise: bytes; for a target in bits the KG error."""
-    return (trial.errors.kg or 0.0) if target.measure == "bpvf" else float(trial.bytes)
 
 
 def _describe(trial: Trial) -> str:

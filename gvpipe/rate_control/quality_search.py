@@ -47,7 +47,7 @@ Attempt = Callable[[float], Trial]
 """Encodes at a quality, and measures."""
 
 
-def find_quality(attempt: Attempt, target: Target, start: float, tolerance: float = TOLERANCE) -> tuple[Trial, list[Trial]]:
+def find_quality(attempt: Attempt, target: Target, start: float) -> tuple[Trial, list[Trial]]:
     """Search the quality that meets the target within the tolerance, from ``start`` on; return it and all trials, in order.
 
     Quality 0 may meet a target error, and quality 100 a size: then that is the result. If no quality within the encodes
@@ -56,7 +56,7 @@ def find_quality(attempt: Attempt, target: Target, start: float, tolerance: floa
     Raises:
         InputError: no quality meets the target; the message names the best.
     """
-    goal = _Goal(target, tolerance)
+    goal = _Goal(target)
     search = _Search(goal, start)
     tried: list[Trial] = []
     quality: float | None = start
@@ -92,7 +92,6 @@ class _Goal:
     """A target as the root of a rising function of quality."""
 
     target: Target
-    tolerance: float
 
     @property
     def is_rate(self) -> bool:
@@ -105,13 +104,13 @@ class _Goal:
 
     def value(self, trial: Trial) -> float:
         """Logarithm of the trial's measure over the middle of what is close enough; below 0 where quality is too low."""
-        middle = self.target.value * math.sqrt(1 - self.tolerance)
+        middle = self.target.value * math.sqrt(1 - TOLERANCE)
         value = math.log(max(self.target.of(trial), LEAST_ERROR) / middle)
         return value if self.is_rate else -value
 
     def is_close(self, value: float) -> bool:
         """Whether the trial lies within the tolerance."""
-        return abs(value) <= -math.log(1 - self.tolerance) / 2
+        return abs(value) <= -math.log(1 - TOLERANCE) / 2
 
 
 class _Bracket:

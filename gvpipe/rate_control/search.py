@@ -12,14 +12,17 @@ from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_spread
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.rate_control.quality_search import TOLERANCE, find_quality
-from gvpipe.rate_control.smallest_search import LEAST_GAIN, find_smallest
+from gvpipe.rate_control.size_estimates import at_error
+from gvpipe.rate_control.smallest_search import find_smallest
 from gvpipe.rate_control.targets import NAMES, Target
 from gvpipe.rate_control.trials import Trial, Trials
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
 
-ROUGH_TOLERANCE, ROUGH_GAIN = 0.3, 0.03
+
+class TooLarge(Exception):
+    """An encode would take more bytes than are of use; for `gvpipe.rate_control.codec_choice` alone."""
 
 
 @dataclass(frozen=True)
@@ -44,28 +47,29 @@ def meet(
     codec: Codec,
     sequence: MeshSequence,
     progress: Progress | None = None,
-    is_rough: bool = False,
+    most: float = math.inf,
     asset: AssetCoder | None = None,
     is_bare: bool = False,
 ) -> Choice:
-    """Encode at the quality that meets a target, within 3 % or, for estimates, roughly.
+    """Encode at the quality that meets a target, within 3 %.
 
     The search starts at the quality of that rmse or KG error, for other targets at the codec's own. What ``asset`` codes beside
     the positions counts as bytes of the file, and ``is_bare`` says whether that is of the bare layout.
 
     Raises:
         InputError: no quality meets it.
+        TooLarge: the first encode shows that positions take more than ``most`` bytes at a target error.
     """
     if target.measure == "max":
         trials = Trials(codec, sequence, target.value, progress, asset, is_bare)
-        trial, tried = find_smallest(trials, target.value, codec.quality, ROUGH_GAIN if is_rough else LEAST_GAIN)
+        trial, tried = find_smallest(trials, target.value, codec.quality)
         reason = (
             f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
         )
         return Choice(trial, trials, tried, reason)
     trials = Trials(codec, sequence, target.largest, progress, asset, is_bare)
-    tolerance = ROUGH_TOLERANCE if is_rough else TOLERANCE
-    trial, tried = find_quality(trials, target, _start(target, codec, sequence, tolerance), tolerance)
+    attempt = trials if target.measure == "bpvf" else _GivingUp(trials, target, most)
+    trial, tried = find_quality(attempt, target, _start(target, codec, sequence))
     found = target.of(trial)
     reason = f"quality {trial.codec.quality:.4g} gives {NAMES[target.measure]} {found:.4g} where {target.value:g} is allowed"
     if found < (1 - TOLERANCE) * target.value:
@@ -73,11 +77,25 @@ def meet(
     return Choice(trial, trials, tried, reason)
 
 
-def _start(target: Target, codec: Codec, sequence: MeshSequence, tolerance: float) -> float:
+class _GivingUp:
+    """Trials that end by `TooLarge` where the first, as if it left the target error, takes more than ``most`` bytes."""
+
+    def __init__(self, trials: Trials, target: Target, most: float) -> None:
+        self._trials, self._target, self._most = trials, target, most
+
+    def __call__(self, quality: float) -> Trial:
+        trial = self._trials(quality)
+        if at_error(trial.own_bytes, self._target.of(trial), self._target.value) > self._most:
+            raise TooLarge
+        self._most = math.inf
+        return trial
+
+
+def _start(target: Target, codec: Codec, sequence: MeshSequence) -> float:
     """The first quality to try: of the KG error in the middle of what is close enough, or the codec's own."""
     if target.measure not in ("rmse", "kg"):
         return codec.quality
-    error = target.value * math.sqrt(1 - tolerance)
+    error = target.value * math.sqrt(1 - TOLERANCE)
     if target.measure == "rmse":
         error *= 100 * frame_diagonal(sequence) / measure_spread(sequence)
     return quality_of(error) if error > 0 else codec.quality

@@ -22,16 +22,13 @@ LEAST_STEP = 1.5
 LEAST_GAIN = 0.003  # part of the size that one more encode must promise to save
 
 
-def find_smallest(
-    attempt: Callable[[float], Trial], bound: float, start: float, tolerance: float = LEAST_GAIN
-) -> tuple[Trial, list[Trial]]:
+def find_smallest(attempt: Callable[[float], Trial], bound: float, start: float) -> tuple[Trial, list[Trial]]:
     """Search the quality whose file, corrections to ``bound`` included, is smallest.
 
     Args:
         attempt: encodes at a quality, corrects to the bound, and measures.
         bound: largest distance of a vertex from where it was, model units.
         start: the first quality.
-        tolerance: part of the size that one more encode must promise to save.
 
     Returns:
         The trial with the smallest file, and all trials, in order.
@@ -44,7 +41,7 @@ def find_smallest(
     step = FIRST_STEP
     while len(tried) < MOST_ENCODES:
         points = sorted(_Point(trial.codec.quality, math.log(trial.bytes)) for trial in tried)
-        quality = _next_quality(points, step, tolerance)
+        quality = _next_quality(points, step)
         if quality is None:
             break
         tried.append(attempt(quality))
@@ -57,13 +54,13 @@ class _Point(NamedTuple):
     size: float  # the logarithm of the bytes
 
 
-def _next_quality(points: list[_Point], step: float, tolerance: float) -> float | None:
+def _next_quality(points: list[_Point], step: float) -> float | None:
     """Where the smallest file should be, from points in order of quality; None if no trial there would pay."""
     i = min(range(len(points)), key=lambda i: points[i].size)
     best = points[i]
     if 0 < i < len(points) - 1:
         quality, gain = _lowest(*points[i - 1 : i + 2])
-        if gain < tolerance:
+        if gain < LEAST_GAIN:
             return None
     else:
         outwards = -1.0 if i < len(points) - 1 else 1.0

@@ -42,6 +42,7 @@ class Trial:
         bpvf: the same, bits per vertex and frame.
         errors: of the decoded frames.
         encoded: the bitstream.
+        own_bytes: of the file without corrections and what lies beside positions.
     """
 
     codec: Codec
@@ -49,6 +50,7 @@ class Trial:
     bpvf: float
     errors: Errors
     encoded: Encoded
+    own_bytes: int = 0
 
     @property
     def bitstream(self) -> Bitstream:
@@ -118,10 +120,10 @@ class Trials:
         if self._asset is not None:
             report("asset", 0.0)
             bitstream = self._asset.add(dataclasses.replace(encoded, bitstream=bitstream), codec, is_final=False)
-        size = file_size(self._as_written(bitstream))
+        size, own_size = file_size(self._as_written(bitstream)), file_size(self._as_written(encoded.bitstream))
         report("measure", 1.0)
         bpvf = 8 * size / (bitstream.n_vertices * bitstream.n_frames)
-        return Trial(codec, size, bpvf, errors, Encoded(bitstream, encoded.permutation))
+        return Trial(codec, size, bpvf, errors, Encoded(bitstream, encoded.permutation), own_size)
 
     def _as_written(self, bitstream: Bitstream) -> Bitstream:
         """What a file holds of an encode."""

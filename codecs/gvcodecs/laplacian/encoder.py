@@ -76,6 +76,7 @@ class Laplacian(BaseCodec):
     summary: ClassVar[str] = "trajectory PCA through geometric Laplacians: smallest files at equal perceived distortion"
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
+    effort: ClassVar[float] = 0.4
     memory_factor: ClassVar[float | None] = 11.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
     seconds_per_vertex: ClassVar[float] = 20e-6  # less than it takes where other codecs take memory
 

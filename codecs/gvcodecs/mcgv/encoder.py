@@ -64,6 +64,11 @@ class Mcgv(Settings):
 
         return find_skeleton(Job(self, sequence, memo or Memo(is_shared=False), progress or silent))
 
+    def _estimate(self, sequence: MeshSequence, most: float, report: Progress, memo: Memo) -> float | None:
+        from gvcodecs.mcgv.encoding.size_estimate import estimate
+
+        return estimate(Job(self, sequence, memo, report), most)
+
     @classmethod
     def segment_parts(cls, bitstream: Bitstream) -> SegmentParts:
         """What each segment has of a bitstream; raises `CorruptFile` where the header does not hold what it must."""

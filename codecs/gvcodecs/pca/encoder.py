@@ -60,6 +60,7 @@ class Pca(BaseCodec):
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
     has_levels: ClassVar[bool] = True
+    effort: ClassVar[float] = 0.1
     memory_factor: ClassVar[float | None] = 5.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better

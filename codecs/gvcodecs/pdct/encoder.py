@@ -73,6 +73,7 @@ class Pdct(BaseCodec):
     holds: ClassVar[bool] = True  # repeated frames are coded around it (`gvpipe.coding.repeated_frames`)
     maps_segments: ClassVar[bool] = True  # they may be coded elsewhere (`gvpipe.runtime.segment_map`)
     codes_live: ClassVar[bool] = True
+    effort: ClassVar[float] = 0.4
     memory_factor: ClassVar[float | None] = 7.0  # of a segment's positions as float32 (`gvpipe.coding.segment_memory`)
 
     quality: float = 75.0  # 0..100, higher is better

@@ -13,7 +13,9 @@ clusters to the blend before where its errors are. The one that costs less goes 
 the first number where neither start gains much on the best before.
 
 By then some parts of the surface have more clusters than they need, since others lacked some. So clusters are merged
-(`cluster_merging`), many at first, with turns of weights and transforms in between, as long as the blend costs less.
+(`cluster_merging`), many at first, with turns of weights and transforms in between, as long as the blend costs less. The
+merged blend is grown and merged again, since clusters are now added to what lacks them most. Blends from different starts
+come closer by this.
 """
 
 from __future__ import annotations
@@ -58,6 +60,9 @@ MERGED = 32.0, 2.0  # costs of a cluster that a merge may add by its estimate: a
 MERGED_LESS = 4.0  # times, after merges that gained too little
 MOST_MERGES = 8  # rounds of them
 LEAST_MERGE_GAIN = 0.005  # of the cost
+REGROWN = 1.5  # times its clusters, what a merged blend grows to before it is merged again
+REGROWTHS = 2  # times that, of a blend found for another step; of a new one once
+REGROWN_POINTS = 4  # per cluster then, on average: merges follow
 PATCH = 2  # order of the neighbourhood that an added cluster starts with
 
 
@@ -72,13 +77,15 @@ def fit_blend(
         n_clusters: K, about; 0: as many as pay.
         target_error: root mean square over points, model units. The step changes until the blend leaves about this error.
             0: the step stays.
-        before: a blend of these points for another step, near which the search of a large surface begins.
+        before: a blend of these points for another step. It is regrown; of a large surface, the search begins near it.
     """
     if isinstance(motions, SampledMotions):
         coarse = motions.coarse
         start = motions.thin(before) if before else coarse.start(n_clusters or 1)
         few, step = _search(coarse, step, n_clusters, target_error, start)
         return _alternate(motions.problem(step), motions.spread(few), LAST_PASSES), step
+    if before and not n_clusters:
+        return _search(motions, step, 0, target_error, before, is_found=True)
     return _search(motions, step, n_clusters, target_error, motions.start(n_clusters or 1))
 
 
@@ -87,16 +94,26 @@ def settle(motions: Motions | SampledMotions, step: float, fitted: Fitted, passe
     return _alternate(motions.problem(step), fitted, passes)
 
 
-def _search(motions: Motions, step: float, n_clusters: int, target_error: float, start: Fitted) -> tuple[Fitted, float]:
-    """As `fit_blend`, from a blend on."""
+def _search(
+    motions: Motions, step: float, n_clusters: int, target_error: float, start: Fitted, is_found: bool = False
+) -> tuple[Fitted, float]:
+    """As `fit_blend`, from a blend on; ``is_found``: the start has about as many clusters as pay."""
     for _ in range(ROUNDS):
         problem = motions.problem(step)
-        found = problem.measure(start) if n_clusters else _find_number(problem, motions, start)
-        best, start = found if n_clusters else _merge_clusters(problem, found), found.fitted
+        if n_clusters:
+            best = problem.measure(start)
+        elif is_found:
+            best = _regrow(problem, problem.measure(start), REGROWTHS)
+            start = best.fitted
+        else:
+            found = _find_number(problem, motions, start)
+            best, start = _merge_clusters(problem, found), found.fitted
         left = motions.error(problem, best, step)
         if not target_error or not left > 0 or abs(math.log(AIM * target_error / left)) < CLOSE:
             break
         step *= min(max((AIM * target_error / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
+    if target_error and not n_clusters and not is_found:  # a fit for a step is an estimate, or the first of two
+        best = _regrow(problem, best, 1)
     (last,) = _try_all(problem, [best], LAST_PASSES)
     return min(best, last, key=lambda trial: trial.cost).fitted, step
 
@@ -137,6 +154,21 @@ def _merge_clusters(problem: Problem, trial: Trial) -> Trial:
             if limit < MERGED[1] * problem.cluster_price or begun.n_clusters == trial.fitted.n_clusters:
                 return min(trial, merged, key=lambda each: each.cost)
         trial = min(trial, merged, key=lambda each: each.cost)
+    return trial
+
+
+def _regrow(problem: Problem, trial: Trial, most_times: int) -> Trial:
+    """A blend that costs no more: clusters are added where errors are, and merged where they nearly agree, in turns."""
+    draw, patches = np.random.default_rng(SEED), k_ring(problem.neighbours, PATCH)
+    most = min(MOST, len(problem.base) / REGROWN_POINTS)
+    for _ in range(most_times):
+        before, count = trial, round(min(most, REGROWN * trial.fitted.n_clusters))
+        if count <= before.fitted.n_clusters:
+            break
+        (grown,) = _try_all(problem, [_grow(before, count, patches, draw)], MERGE_PASSES)
+        trial = min(before, _merge_clusters(problem, grown), key=lambda each: each.cost)
+        if trial.cost > (1 - LEAST_GAIN) * before.cost:
+            break
     return trial
 
 
