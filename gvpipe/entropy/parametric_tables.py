@@ -15,6 +15,7 @@ import numpy as np
 
 from gvpipe.entropy.tokens import DIRECT
 from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.elementary import log2
 
 N_TOKENS = 40  # magnitudes below 2**15
 RATIO_BITS = 12
@@ -60,7 +61,7 @@ def best(counts: Int64) -> tuple[int, int, float]:
     costs = []
     for ratio in range(len(RATIOS)):
         frequencies = table(zero, ratio)
-        costs.append(float(-(counts * np.log2(frequencies / frequencies.sum())).sum()))
+        costs.append(float(-(counts * log2(frequencies / frequencies.sum())).sum()))
     ratio = int(np.argmin(costs))
     return zero, ratio, costs[ratio]
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, cast
 
 from gvpipe.coding.codec import Codec
 from gvpipe.coding.quality_scale import error_of
+from gvpipe.foundation.elementary import power
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.sequence import MeshSequence
@@ -130,7 +131,7 @@ def _estimate(
     trial, quality = choice.trial, choice.trial.codec.quality
     better = cast("Codec", dataclasses.replace(cast("DataclassInstance", codec), quality=quality))
     if target.measure == "bpvf":
-        return _cost(trial, target) * (trial.bpvf / target.value) ** (1 / ELASTICITY), better
+        return _cost(trial, target) * power(trial.bpvf / target.value, 1 / ELASTICITY), better
     shared = sum(len(data) for name, data in trial.bitstream.sections.items() if not name[-1].isdigit())
     off = 1.0 if target.measure == "max" else target.of(trial) / target.value
     return shared + (trial.bytes - shared) * off**ELASTICITY * sequence.n_frames / n_sample, better

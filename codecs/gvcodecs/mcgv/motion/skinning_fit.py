@@ -18,7 +18,6 @@ By then some parts of the surface have more clusters than they need, since other
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
@@ -33,6 +32,7 @@ from gvcodecs.mcgv.motion.segmentation import SEED
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
 from gvcodecs.mcgv.motion.weight_coding import Prices, guess_prices, learn_prices
 from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.elementary import log, power
 from gvpipe.mesh.topology import k_ring
 
 if TYPE_CHECKING:
@@ -94,9 +94,9 @@ def _search(motions: Motions, step: float, n_clusters: int, target_error: float,
         found = problem.measure(start) if n_clusters else _find_number(problem, motions, start)
         best, start = found if n_clusters else _merge_clusters(problem, found), found.fitted
         left = motions.error(problem, best, step)
-        if not target_error or not left > 0 or abs(math.log(AIM * target_error / left)) < CLOSE:
+        if not target_error or not left > 0 or abs(log(AIM * target_error / left)) < CLOSE:
             break
-        step *= min(max((AIM * target_error / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
+        step *= min(max(power(AIM * target_error / left, 1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
     (last,) = _try_all(problem, [best], LAST_PASSES)
     return min(best, last, key=lambda trial: trial.cost).fitted, step
 
