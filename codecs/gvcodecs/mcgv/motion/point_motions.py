@@ -11,7 +11,6 @@ the surface, stands for the points nearest to it, and is joined with those whose
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import islice
 from threading import Lock
 
@@ -20,7 +19,7 @@ from scipy import sparse
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
-from gvcodecs.mcgv.motion.segmentation import SEED, k_means, local_motions, nearest
+from gvcodecs.mcgv.motion.segmentation import draw_seeds, k_means, local_motions, nearest
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.mesh.topology import components, k_ring
@@ -41,7 +40,6 @@ BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
 K_MEANS_ROUNDS = 8
 NEGLIGIBLE = 0.1  # part of the noise of rounding to steps: motion below is left out
-TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
 BLOCK = 1 << 16  # points whose displacements are turned at a time
 
 
@@ -158,7 +156,7 @@ class Clustering:
         self._features = features
         self._sample = features[:: max(1, len(features) // SAMPLES)]
         self._seeds: list[int] = []
-        self._drawn, self._lock = _draw_seeds(self._sample), Lock()
+        self._drawn, self._lock = draw_seeds(self._sample), Lock()
 
     def start(self, n_clusters: int) -> Fitted:
         """Each point follows its own cluster alone, of at most ``n_clusters``."""
@@ -170,25 +168,6 @@ class Clustering:
         parts[:, 0] = TOTAL
         clusters[:, 0] = nearest(self._features, k_means(self._sample, seeds, K_MEANS_ROUNDS))
         return renumber(Weights(clusters, parts))
-
-
-def _draw_seeds(sample: Float64) -> Iterator[int]:
-    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
-    draw = np.random.default_rng(SEED)
-    squares = np.square(sample).sum(axis=1)
-    seeds, columns = [int(squares.argmax())], np.ascontiguousarray(sample.T)
-    distance = np.full(len(sample), np.inf)
-    while True:
-        yield seeds[-1]
-        last = seeds[-1]
-        distance = np.minimum(
-            distance, np.maximum(squares + squares[last] - 2 * product(sample[last : last + 1], columns)[0], 0)
-        )
-        distance[seeds] = 0
-        total = np.cumsum(distance)
-        if not total[-1] > TINY * squares.sum():
-            return
-        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
 
 
 def _displacements(frames: Float64, base: Float64) -> Float64:

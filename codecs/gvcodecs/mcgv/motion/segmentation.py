@@ -18,7 +18,7 @@ best, and refits, a few times. It lowers the residual by a tenth (cow) to a thir
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Iterator
 from itertools import islice
 
 import numpy as np
@@ -44,6 +44,8 @@ DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
 RIDGE = 1e-6  # of the trace of a normal matrix: decides the directions that a flat neighbourhood leaves open
 RESTARTS = 4  # of k-means; the best is kept
 SEED = 2007
+TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
+ROUNDS = 50  # of k-means
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
 REFINE_FLOATS = 12 << 20  # their coordinates held at a time
@@ -204,18 +206,35 @@ def _principal_coordinates(rows: Float64) -> Float64:
 
 def _k_means(features: Float64, n_clusters: int) -> Int32:
     """Labels ``(P,)``."""
-    from scipy.cluster.vq import kmeans2
-
     n_clusters = min(n_clusters, len(np.unique(np.round(features, 9), axis=0)))
-    best, best_cost = np.zeros(len(features), np.int32), np.inf
+    best, best_cost = np.zeros(len(features), np.int64), np.inf
     for restart in range(RESTARTS if n_clusters > 1 else 0):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped below
-            centres, labels = kmeans2(features, n_clusters, iter=50, minit="++", rng=np.random.default_rng(SEED + restart))
+        seeds = [*islice(draw_seeds(features, restart), n_clusters)]
+        centres = k_means(features, features[seeds], ROUNDS)
+        labels = nearest(features, centres)
         cost = float(((features - centres[labels]) ** 2).sum())
         if cost < best_cost:
             best, best_cost = labels, cost
     return _relabel(best)
+
+
+def draw_seeds(sample: Float64, restart: int = 0) -> Iterator[int]:
+    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+    draw = np.random.default_rng(SEED + restart)
+    squares = np.square(sample).sum(axis=1)
+    seeds, columns = [int(squares.argmax())], np.ascontiguousarray(sample.T)
+    distance = np.full(len(sample), np.inf)
+    while True:
+        yield seeds[-1]
+        last = seeds[-1]
+        distance = np.minimum(
+            distance, np.maximum(squares + squares[last] - 2 * product(sample[last : last + 1], columns)[0], 0)
+        )
+        distance[seeds] = 0
+        total = np.cumsum(distance)
+        if not total[-1] > TINY * squares.sum():
+            return
+        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
 
 
 def k_means(sample: Float64, centres: Float64, rounds: int) -> Float64:
