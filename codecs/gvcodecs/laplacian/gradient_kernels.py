@@ -1,6 +1,6 @@
 """Kernel of `shape_fit`: damped least squares by conjugate gradients, sums in one order.
 
-Normal equations are not made: the derivatives and their transpose are multiplied one after the other. Source: M. R. Hestenes
+Normal equations are not made: each row of the derivatives is multiplied twice while it is at hand. Source: M. R. Hestenes
 and E. Stiefel, "Methods of Conjugate Gradients for Solving Linear Systems", 1952, DOI 10.6028/jres.049.044.
 """
 
@@ -14,11 +14,11 @@ from gvpipe.trajectory.product_kernels import Rows
 
 
 @compiled
-def solve_damped(jacobian: Rows, transposed: Rows, added: Float64, errors: Float64, close: float, most: int) -> Float64:
+def solve_damped(jacobian: Rows, added: Float64, errors: Float64, close: float, most: int) -> Float64:
     """Solve ``(J^T J + diag(added)) x = J^T errors`` roughly: ``(n,)``.
 
     Args:
-        jacobian, transposed: J ``(m, n)`` and its transpose.
+        jacobian: J ``(m, n)``.
         added: ``(n,)`` to the diagonal.
         errors: ``(m,)``.
         close: part of the right side's length that ends the search.
@@ -26,13 +26,16 @@ def solve_damped(jacobian: Rows, transposed: Rows, added: Float64, errors: Float
     """
     n = len(added)
     solution, direction, scale = np.zeros(n), np.zeros(n), np.empty(n)
+    starts, columns, values = jacobian
+    left, turned = np.zeros(n), np.empty(n)
     for i in range(n):
-        total = added[i]
-        for k in range(transposed.starts[i], transposed.starts[i + 1]):
-            total += transposed.values[k] * transposed.values[k]
-        scale[i] = 1.0 / total
-    left, turned, moved = np.empty(n), np.empty(n), np.empty(len(errors))
-    _multiply(transposed, errors, left)
+        scale[i] = added[i]
+    for row in range(len(errors)):
+        for k in range(starts[row], starts[row + 1]):
+            scale[columns[k]] += values[k] * values[k]
+            left[columns[k]] += values[k] * errors[row]
+    for i in range(n):
+        scale[i] = 1.0 / scale[i]
     wanted = close * close * _dot(left, left)
     before = 1.0
     for step in range(most):
@@ -45,10 +48,9 @@ def solve_damped(jacobian: Rows, transposed: Rows, added: Float64, errors: Float
         before = energy
         for i in range(n):
             direction[i] = scale[i] * left[i] + factor * direction[i]
-        _multiply(jacobian, direction, moved)
-        _multiply(transposed, moved, turned)
         for i in range(n):
-            turned[i] += added[i] * direction[i]
+            turned[i] = added[i] * direction[i]
+        _add_twice(jacobian, direction, turned)
         length = energy / _dot(direction, turned)
         for i in range(n):
             solution[i] += length * direction[i]
@@ -57,13 +59,15 @@ def solve_damped(jacobian: Rows, transposed: Rows, added: Float64, errors: Float
 
 
 @compiled
-def _multiply(matrix: Rows, vector: Float64, result: Float64) -> None:
-    starts, columns, values = matrix
-    for i in range(len(result)):
+def _add_twice(jacobian: Rows, vector: Float64, result: Float64) -> None:
+    """Add ``J^T J vector``."""
+    starts, columns, values = jacobian
+    for row in range(len(starts) - 1):
         total = 0.0
-        for k in range(starts[i], starts[i + 1]):
+        for k in range(starts[row], starts[row + 1]):
             total += values[k] * vector[columns[k]]
-        result[i] = total
+        for k in range(starts[row], starts[row + 1]):
+            result[columns[k]] += values[k] * total
 
 
 @compiled

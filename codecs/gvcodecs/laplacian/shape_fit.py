@@ -76,8 +76,7 @@ def _solve(state: _State, damping: Float64) -> Float64:
 
     jacobian = state.jacobian
     diagonal = np.bincount(jacobian.indices, jacobian.data**2, jacobian.shape[1])
-    rows = as_rows(jacobian), as_rows(jacobian.T.tocsr())
-    return solve_damped(*rows, damping * diagonal + LEAST, state.errors, CLOSE, GRADIENTS)
+    return solve_damped(as_rows(jacobian), damping * diagonal + LEAST, state.errors, CLOSE, GRADIENTS)
 
 
 def _measure(shape: EdgeShape, unit: float, points: Float64) -> _State:
