@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 from folders import ROOT
+
+import gvpipe
+from gvpipe.benchmark.sweep import settings_of
 
 # numpy names those that it lacks: no error
 FEATURES = "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V3 X86_V4"
@@ -40,3 +46,12 @@ def lines_as(machine: dict[str, str], script: str, *arguments: object) -> list[s
     done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
+
+
+def encoded_digest(path: str | Path, codec: str) -> str:
+    """The hash of the file of a sequence at KG 0.1; ``codec`` is ``id`` or ``id:key=value``."""
+    (settings,) = settings_of(codec, [75.0], {})  # the error decides
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder, "coded.mp4")
+        gvpipe.encode(path, target, settings, target_kg=0.1)
+        return f"{hashlib.sha256(target.read_bytes()).hexdigest()} {Path(path).stem} {codec}"
