@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -73,6 +74,13 @@ def values(mesh: Any, name: str) -> list[Any]:
     return found
 
 
+def sounds(scene: Any) -> list[str]:
+    """Names of the strips in the sequencer."""
+    editor = scene.sequence_editor
+    strips = () if editor is None else editor.strips if hasattr(editor, "strips") else editor.sequences  # before Blender 4.4
+    return [strip.name for strip in strips]
+
+
 def imported(folder: Path) -> Found:
     """Import, step, undo, render, save, export again, switch off."""
     scene = bpy.context.scene
@@ -92,7 +100,8 @@ def imported(folder: Path) -> Found:
         "state": values(first, "state"),
         "polygons": sum(len(each.data.polygons) for each in meshes()),
         "images": sorted(each.name for each in bpy.data.images if each.packed_file),
-        "sounds": [strip.name for strip in (scene.sequence_editor.strips if scene.sequence_editor else ())],
+        "sounds": sounds(scene),
+        "reads sound": bpy.app.build_options.audaspace,
         "valid": [not each.data.validate(verbose=False) for each in meshes()],
     }
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "saved" / "scene.blend"))
@@ -285,3 +294,5 @@ def main(step: str, folder: str) -> None:
 
 if __name__ == "__main__":
     main(*sys.argv[1:])
+    sys.stdout.flush()
+    os._exit(0)  # the module of Blender 4.2 crashes while Python ends, where a handler is registered

@@ -41,6 +41,7 @@ def lab(folder: Path, settings: Path) -> Iterator[str]:
         "ServerApp.port": port,
         "ServerApp.allow_root": True,
         "LabApp.expose_app_in_browser": True,
+        "JupyterNotebookApp.expose_app_in_browser": True,
         "LabApp.news_url": "",
     }
     command = [
@@ -81,9 +82,9 @@ def write_notebook(path: Path, cells: Sequence[str]) -> None:
     path.write_text(json.dumps({"cells": given, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}))
 
 
-def open_notebook(browser: Any, address: str, name: str) -> None:
-    """Open a notebook and wait for its kernel."""
-    browser.get(f"{address}/lab/tree/{name}?reset")
+def open_notebook(browser: Any, address: str, name: str, program: str = "lab/tree") -> None:
+    """Open a notebook in JupyterLab, or in Notebook 7 (``notebooks``), and wait for its kernel."""
+    browser.get(f"{address}/{program}/{name}?reset")
     body = """const until = async (found) => { while (!found()) await new Promise((resolve) => setTimeout(resolve, 50)); };
         await until(() => window.jupyterapp?.shell.currentWidget?.context?.isReady);
         await until(() => jupyterapp.shell.currentWidget.context.sessionContext.session?.kernel?.status === "idle");

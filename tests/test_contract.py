@@ -30,6 +30,7 @@ from gvpipe.testing.promises import (
     awkward_input,
     awkward_inputs,
     coincidence,
+    hostile_input,
     quality,
     repeated_frames,
     same_bytes,
@@ -76,7 +77,7 @@ AWKWARD_CASES = [  # each variant meets every second input, in one of both order
     )
     for (i, variant), reorder, (j, name) in product(enumerate(VARIANTS), (False, True), enumerate(AWKWARD))
 ]
-LONG = (same_bytes, quality, segments)  # promises that codecs with their own settings alone keep in a quick run
+LONG = (same_bytes, quality, segments, hostile_input)  # promises that codecs without settings alone are held to in a quick run
 ELSEWHERE = (awkward_inputs, stillness, coincidence, repeated_frames)  # below, and in test_stillness.py
 PROMISE_CASES = [
     pytest.param(name, promise, id=f"{name}-{promise.name}", marks=[pytest.mark.slow] if promise in LONG and settings else [])
@@ -112,6 +113,11 @@ def path(request: pytest.FixtureRequest, subjects: Callable[[str], Subject]) -> 
 
 
 each_file = pytest.mark.parametrize("path", list(CHOSEN), indirect=True)
+a_file_of_each_codec = pytest.mark.parametrize(  # with other settings in the slow run
+    "path",
+    [pytest.param(name, marks=[pytest.mark.slow] if settings else []) for name, (_, settings) in CHOSEN.items()],
+    indirect=True,
+)
 
 
 @pytest.mark.parametrize(("variant", "promise"), PROMISE_CASES)
@@ -124,7 +130,7 @@ def test_awkward_inputs(codec: str, settings: dict[str, Any], reorder: bool, nam
     awkward_input(Subject(make(codec, **settings), tmp_path), AWKWARD[name], reorder)
 
 
-@each_file
+@a_file_of_each_codec
 def test_every_truncated_prefix_is_refused(path: Path, tmp_path: Path) -> None:
     data = path.read_bytes()
     cuts = {*range(64), *range(len(data) - 64, len(data)), *np.linspace(64, len(data) - 1, 150, dtype=int).tolist()}

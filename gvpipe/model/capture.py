@@ -17,9 +17,10 @@ from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.notes import count
 from gvpipe.media.sound import Sound
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.shown import ShownInNotebooks
 
 
-class Capture:
+class Capture(ShownInNotebooks):
     """A row of shots, one behind the other on one clock.
 
     Args:
@@ -108,11 +109,6 @@ class Capture:
 
         numbers = {"frames": str(len(self)), "shots": str(len(self.shots)), "frames per second": f"{self.fps:g}"}
         return card(self.name, numbers, self.shots[0])
-
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        from gvpipe.model.notebook import mimebundle
-
-        return mimebundle(self)
 
     def part(self, start: int, stop: int | None = None) -> Capture:
         """Frames ``start`` to ``stop``; they still load when they are read. Raises `InputError`: there are no such frames."""

@@ -33,6 +33,7 @@ from gvpipe.grids.volume import Volume
 from gvpipe.media.sound import Sound
 from gvpipe.model.frame_views import Guarded, Narrowed, Permuted, Shifted, Span, Watched
 from gvpipe.model.origin import as_origin, choose_origin, narrow, rounding
+from gvpipe.model.shown import ShownInNotebooks
 
 BARE: dict[str, Any] = {
     "attributes": {},
@@ -48,7 +49,7 @@ CHUNK_BYTES = 4 << 20  # positions handed out at a time by `chunks`: large enoug
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeshSequence:
+class MeshSequence(ShownInNotebooks):
     """A triangle-mesh animation with constant connectivity.
 
     It slices by frame as `gvpipe.Player` does: ``sequence[3]`` is ``(V, 3) float32``, ``sequence[2:5]`` is ``(3, V, 3)``, both
@@ -241,11 +242,6 @@ class MeshSequence:
         from gvpipe.model.notebook import card
 
         return card(self.name, numbers_of(self), self)
-
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        from gvpipe.model.notebook import mimebundle
-
-        return mimebundle(self)
 
     def read(self, start: int, stop: int) -> Float32:
         """Return frames ``start`` to ``stop``: ``(stop - start, V, 3) float32``, model units, relative to the origin.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+from dataclasses import dataclass
 from typing import Any
 
 from gvpipe.foundation.errors import GvpipeError
@@ -30,15 +31,37 @@ def interactive(shown: Any, still: str) -> dict[str, Any] | None:
     sources = shown.sides if isinstance(shown, Comparison) else [shown]
     if not sources:
         return None
-    if not has_widgets():
-        return _with_hint(still, REMEDY)
-    try:
-        if any(map(_is_large, sources)):
-            return _with_hint(still, TOO_LARGE)
-        bundle = show(*sources)._repr_mimebundle_()
-    except GvpipeError as exc:
-        return _with_hint(still, str(exc))
+    player = _player(sources)
+    if isinstance(player, str):
+        return {"text/html": _with_hint(still, player)}
+    bundle: dict[str, Any] = player._repr_mimebundle_()
     return {**bundle, "text/html": still + bundle["text/html"]} if isinstance(shown, Comparison) else bundle
+
+
+@dataclass(frozen=True)
+class Still:
+    """HTML in place of a player."""
+
+    html: str
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+
+def player_or_still(shown: Any, still: str) -> Any:
+    """Return a player's widget, for notebooks whose pages take that, or a `Still` with what to do about it."""
+    player = _player([shown])
+    return Still(_with_hint(still, player)) if isinstance(player, str) else player
+
+
+def _player(sources: list[Any]) -> Any:
+    """The widget, or what to do to get one."""
+    if not has_widgets():
+        return REMEDY
+    try:
+        return TOO_LARGE if any(map(_is_large, sources)) else show(*sources)
+    except GvpipeError as exc:
+        return str(exc)
 
 
 def _is_large(source: Any) -> bool:
@@ -51,5 +74,5 @@ def _is_large(source: Any) -> bool:
     return sum(shot.n_frames * shot.n_vertices for shot in shots) > MOST_SAMPLES and not is_ready(source, ERROR)
 
 
-def _with_hint(still: str, hint: str) -> dict[str, Any]:
-    return {"text/html": f"{still}<div>{html.escape(hint)}</div>"}
+def _with_hint(still: str, hint: str) -> str:
+    return f"{still}<div>{html.escape(hint)}</div>"

@@ -21,12 +21,13 @@ from gvpipe.io.simulation.vtk_frames import to_pyvista
 from gvpipe.media.sound import Sound
 from gvpipe.model.capture import Capture, LazyShots
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.model.shown import ShownInNotebooks
 from gvpipe.playback.player import Player
 
 MOST_OPEN = 4  # shots whose decoded frames are kept
 
 
-class CapturePlayer:
+class CapturePlayer(ShownInNotebooks):
     """An open capture: a row of shots, each a `Player`, on one clock. A file of one shot is a row of one.
 
     A context manager; thread-safe; pickled, it is opened again by its path. A shot is opened when it is asked for, and the last
@@ -139,11 +140,6 @@ class CapturePlayer:
 
     def _repr_html_(self) -> str:
         return self.capture()._repr_html_()
-
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        from gvpipe.model.notebook import mimebundle
-
-        return mimebundle(self)
 
     def __enter__(self) -> CapturePlayer:
         return self

@@ -35,12 +35,13 @@ from gvpipe.io.simulation.vtk_frames import to_pyvista
 from gvpipe.media.sound import Sound
 from gvpipe.model.coarse_asset import add_asset
 from gvpipe.model.sequence import MeshSequence, describe, numbers_of
+from gvpipe.model.shown import ShownInNotebooks
 from gvpipe.model.skin import Skin
 from gvpipe.playback.frame_cache import FrameCache
 from gvpipe.playback.shared_reader import SharedReader
 
 
-class Player:
+class Player(ShownInNotebooks):
     """An open geometry video: a sequence of frames, each ``(V, 3) float32``, model units, relative to ``origin``.
 
     A context manager; thread-safe. A forked process goes on with it. Pickled, it is opened again by its path, so the file must
@@ -295,11 +296,6 @@ class Player:
         numbers["size"] = f"{size} bytes, {8 * size / n_samples:.3f} bits per vertex and frame"
         numbers["codec"] = f"{self.bitstream.codec} version {self.bitstream.version}"
         return card(self.path, numbers, sequence)
-
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        from gvpipe.model.notebook import mimebundle
-
-        return mimebundle(self)
 
     def __enter__(self) -> Player:
         return self

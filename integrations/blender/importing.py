@@ -47,8 +47,8 @@ class IMPORT_OT_geometry_video(bpy.types.Operator, ImportHelper):
         except Exception as error:
             self.report({"ERROR"}, playing.describe(error))
             return {"CANCELLED"}
-        if source.has_sound:
-            add_sound(context.scene, source)
+        if source.has_sound and not add_sound(context.scene, source):
+            self.report({"WARNING"}, "without sound, which this Blender cannot read")
         for object_ in context.selected_objects:
             object_.select_set(False)
         for object_ in made:
@@ -149,12 +149,15 @@ def set_scene(scene: Any, source: Source) -> None:
     scene.frame_end = scene.frame_start + len(source) - 1
 
 
-def add_sound(scene: Any, source: Source) -> None:
-    """A strip of the file's sound, from the scene's first frame, in the sequencer."""
+def add_sound(scene: Any, source: Source) -> bool:
+    """Add a strip of the file's sound to the sequencer, from the scene's first frame; False: this Blender reads no sound."""
+    if not bpy.app.build_options.audaspace:
+        return False
     editor = scene.sequence_editor_create()
     strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # of Blender before 4.4
     channel = 1 + max((strip.channel for strip in strips), default=0)
     strips.new_sound(os.path.basename(source.path), source.path, channel, scene.frame_start)
+    return True
 
 
 class IO_FH_geometry_video(bpy.types.FileHandler):

@@ -42,7 +42,8 @@ class Player {
 
 async function send(webview, uri) {
   try {
-    await webview.postMessage({ bytes: await vscode.workspace.fs.readFile(uri) });
+    const file = await vscode.workspace.fs.readFile(uri);
+    await webview.postMessage({ bytes: new Uint8Array(file) }); // a Buffer, as remote folders give, would come as an object
   } catch (error) {
     await webview.postMessage({ error: error.message });
   }

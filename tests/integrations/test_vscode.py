@@ -31,7 +31,7 @@ exports.commands = {
 exports.window = { registerCustomEditorProvider: (view, provider) => (exports.provider = provider) };
 exports.workspace = { fs: { readFile: async ({ path }) => {
   if (path === "/gone.mp4") throw new Error("it is gone");
-  return new Uint8Array([1, 2]);
+  return Buffer.from([1, 2]); // as remote folders give
 } } };
 """
 PLAY = """
@@ -40,7 +40,8 @@ require(process.argv[1]).activate({ extensionUri: vscode.Uri.joinPath({ path: ""
 const posted = [];
 const webview = {
   onDidReceiveMessage: (listen) => (webview.receive = listen),
-  postMessage: async (message) => posted.push(message.bytes ? [...message.bytes] : message),
+  postMessage: async ({ bytes, error }) => // VS Code sends arrays as such whose class is one of JavaScript's own
+    posted.push(bytes?.constructor.name === "Uint8Array" ? [...bytes] : bytes ? { ...bytes } : { error }),
   asWebviewUri: (uri) => "web:" + uri.path,
 };
 (async () => {

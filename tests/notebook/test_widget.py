@@ -221,3 +221,12 @@ def test_a_bar_follows_what_takes_long(kernel: list[dict[str, Any]], monkeypatch
     bar.finish("encoded")
     assert [each["text/plain"] for each in kernel] == ["encoding walk: positions 25%", "encoded"]
     assert 'value="0.250"' in kernel[0]["text/html"]
+
+
+def test_marimo_gets_a_widget_or_a_still(parted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with gvpipe.open(parted) as video:
+        shown: Any = video._display_()
+        assert shown.n_frames == 12 and shown.playing
+        monkeypatch.setattr(display, "has_widgets", lambda: False)
+        still: Any = video._display_()
+    assert "data:image/png" in still._repr_html_() and libraries.REMEDY in html.unescape(still._repr_html_())

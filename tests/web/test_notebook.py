@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -332,3 +333,12 @@ def _play_saved(browser: Any) -> None:
         return inside().video.frameCount""",
     )
     assert frames == N_FRAMES
+
+
+@pytest.mark.skipif(find_spec("notebook") is None, reason="no notebook; pip install notebook")
+def test_a_player_plays_in_notebook_7(folder: Path, address: str, browser: Any) -> None:
+    write_notebook(folder / "seven.ipynb", ["import gvpipe", "gvpipe.open('sheet.mp4')"])
+    open_notebook(browser, address, "seven.ipynb", "notebooks")
+    command(browser, "notebook:run-all-cells")
+    in_player(browser, "await until(() => document.querySelector('geometry-video')?.currentFrame > 5);")
+    assert not in_player(browser, "return Boolean(document.querySelector('.jp-LabShell'))")
