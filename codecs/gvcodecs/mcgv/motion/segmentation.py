@@ -209,7 +209,7 @@ def _k_means(features: Float64, n_clusters: int) -> Int32:
     n_clusters = min(n_clusters, len(np.unique(np.round(features, 9), axis=0)))
     best, best_cost = np.zeros(len(features), np.int64), np.inf
     for restart in range(RESTARTS if n_clusters > 1 else 0):
-        seeds = [*islice(draw_seeds(features, restart), n_clusters)]
+        seeds = [*islice(draw_seeds(features, restart + 1), n_clusters)]
         centres = k_means(features, features[seeds], ROUNDS)
         labels = nearest(features, centres)
         cost = float(((features - centres[labels]) ** 2).sum())
@@ -219,10 +219,13 @@ def _k_means(features: Float64, n_clusters: int) -> Int32:
 
 
 def draw_seeds(sample: Float64, restart: int = 0) -> Iterator[int]:
-    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
+    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++).
+
+    The first is the longest one, or for a restart any.
+    """
     draw = np.random.default_rng(SEED + restart)
     squares = np.square(sample).sum(axis=1)
-    seeds, columns = [int(squares.argmax())], np.ascontiguousarray(sample.T)
+    seeds, columns = [int(draw.integers(len(sample)) if restart else squares.argmax())], np.ascontiguousarray(sample.T)
     distance = np.full(len(sample), np.inf)
     while True:
         yield seeds[-1]
