@@ -131,10 +131,12 @@ def _samples() -> dict[str, MeshSequence]:
 def _scenes() -> dict[str, MeshSequence]:
     """A scene with all that files hold, and its parts alone, whose cases take less time."""
     scene: MeshSequence = _of_tests("asset_scene.py").scene(N_FRAMES)
-    cells = _of_tests("asset_coding/test_reduction.py")
+    cells, grids = _of_tests("asset_coding/test_reduction.py"), _of_tests("cell_grids.py")
     by_polygon = gvpipe.Field(np.repeat(cells.by_cell(), 2, axis=1).astype(np.float64) + 1e7, "triangle")
     return {
         "cells": cells.quads(cells=by_polygon).part(0, N_FRAMES),
+        "corners": grids.sequence_of(*grids.quadratic(24, (3, 3, 3))),
+        "polyhedra": grids.sequence_of(*grids.voronoi(12)),
         "volume": _of_tests("io/simulation/test_volumes.py").block("mixed", shuffled=True).part(0, 3),
         "scene": scene,
         "layers": replace(scene, fields={}),

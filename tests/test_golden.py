@@ -6,17 +6,20 @@ released is never written again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from asset_scene import scene
+from cell_grids import SPLITS, lattice, quadratic, sequence_of, voronoi
 from folders import GOLDEN
 from sequences import held, partly_still, patched, rigid, waving
 
 import gvpipe
 from gvpipe.foundation.isolation.python import run_python
+from gvpipe.grids.cells import Cells, equal_cells, structured_cells
 
 CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "laplacian-1": ("laplacian", {"segment": 7}),
@@ -114,6 +117,50 @@ def test_golden_file_of_each_layout(name: str, request: pytest.FixtureRequest) -
     assert gvpipe.info(video).layout == name.split("-")[0]
     assert np.array_equal(decoded.faces, wanted.faces)
     assert np.array_equal(np.asarray(decoded.positions), np.asarray(wanted.positions))
+
+
+VOLUMES: dict[str, tuple[Callable[[], gvpipe.MeshSequence], dict[str, Any]]] = {
+    "order": (lambda: sequence_of(*quadratic(26, (3, 3, 3), shuffled=False)), {}),
+    "walk-ranked": (lambda: sequence_of(_shuffled(_tetrahedra((5, 5, 4))), lattice((5, 5, 4))), {"reorder": True}),
+    "corners": (lambda: sequence_of(*quadratic(24, (3, 3, 3))), {}),
+    "corners-reorder": (lambda: sequence_of(*quadratic(25, (3, 3, 3))), {"reorder": True}),
+    "polyhedra": (lambda: sequence_of(*voronoi(12)), {}),
+    "polyhedra-reorder": (lambda: sequence_of(*voronoi(12)), {"reorder": True}),
+}
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_golden_file_of_each_way_to_code_cells(name: str, request: pytest.FixtureRequest) -> None:
+    video, expected = GOLDEN / "volumes" / f"{name}.mp4", GOLDEN / "volumes" / f"{name}.npz"
+    make, settings = VOLUMES[name]
+    if request.config.getoption("--write-golden"):
+        gvpipe.encode(make(), video, "pca", bare=True, **settings)
+        np.savez_compressed(expected, **_arrays_of(gvpipe.read(video)))
+    found, wanted = _arrays_of(gvpipe.read(video)), np.load(expected)
+    assert set(found) == set(wanted)
+    for key, values in found.items():
+        assert values.dtype == wanted[key].dtype and np.allclose(values, wanted[key], rtol=0, atol=1e-5), key
+
+
+def _tetrahedra(sizes: tuple[int, int, int]) -> Cells:
+    hexahedra = structured_cells(sizes).nodes.reshape(-1, 8)
+    return equal_cells(10, np.concatenate([hexahedra[:, list(split)] for split in SPLITS[24]]))
+
+
+def _shuffled(cells: Cells) -> Cells:
+    return cells.select(np.random.default_rng(3).permutation(len(cells.types)))
+
+
+def _arrays_of(sequence: gvpipe.MeshSequence) -> dict[str, Any]:
+    """What lies inside, as arrays."""
+    volume = sequence.volume
+    assert volume is not None
+    made: dict[str, Any] = {"types": volume.cells.types, "offsets": volume.cells.offsets, "nodes": volume.cells.nodes}
+    if volume.cells.polyhedra is not None:
+        made |= {f"polyhedra_{key}": values for key, values in vars(volume.cells.polyhedra).items()}
+    made |= {"points": np.asarray(volume.points[:])} | ({} if volume.order is None else {"order": volume.order})
+    numbers = {**volume.point_fields, **volume.cell_fields}
+    return made | {f"field_{key}": field[:] for key, field in numbers.items()}
 
 
 PLAIN = """

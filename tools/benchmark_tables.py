@@ -1,15 +1,15 @@
 """Writes the tables of the benchmark pages from the results in ``docs/benchmarks``.
 
     python tools/benchmark_tables.py                    # the tables between markers, in all pages
-    python tools/benchmark_tables.py plots              # the pictures of docs/scale.md
+    python tools/benchmark_tables.py plots              # the pictures of docs/scale.md and docs/curves.md
     python tools/benchmark_tables.py points FILE.json   # every point of one file, to standard output
 
 A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``, NAME one of `TABLES`. Results have the shape that
-`gvpipe bench --json` writes (`gvpipe.benchmark.report.BenchReport`). A file may add to it: ``rates`` and
-``kg_differences``, ``sted_differences`` where its points are rounded, ``targets`` (encodes to a given error), ``vdmc`` (the
-rates of another codec). What is null was not recorded. The folder ``scale`` has what `gvpipe bench --scale` writes
-(`gvpipe.benchmark.scale_report.ScaleReport`), and ``plan.json`` of ``tools/measure_plan.py``. The folder ``reproduction`` has
-what `gvpipe reproduce` writes (`gvpipe.benchmark.reproduction.reproduce.Reproduction`).
+`gvpipe bench --json` writes (`gvpipe.benchmark.report.BenchReport`). A file may add to it: ``targets`` (encodes to a given
+error). What is null was not recorded. The folder ``curves`` has what ``tools/measure_curves.py`` writes. The folder ``scale``
+has what `gvpipe bench --scale` writes (`gvpipe.benchmark.scale_report.ScaleReport`), and ``plan.json`` of
+``tools/measure_plan.py``. The folder ``reproduction`` has what `gvpipe reproduce` writes
+(`gvpipe.benchmark.reproduction.reproduce.Reproduction`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from gvpipe.benchmark.bd_rate import average_rate_difference, rate_at
 from gvpipe.benchmark.growth import exponents, fit_line
+from gvpipe.benchmark.leaderboard import differences, leaders, matrix, points_by, rates
+from gvpipe.benchmark.plots import draw as draw_curves
 from gvpipe.benchmark.report import BenchReport
 from gvpipe.benchmark.reproduction.claims import FAILS, HOLDS, NOT_RUN
 from gvpipe.benchmark.reproduction.reproduce import table as reproduction_table
@@ -36,12 +37,13 @@ from gvpipe.benchmark.tables import tables
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = (
     DOCS / "benchmarks.md",
+    DOCS / "curves.md",
     DOCS / "reproduction.md",
     DOCS / "scale.md",
     DOCS / "codecs" / "mcgv.md",
-    DOCS / "experiments" / "benchmark-curves-version-2.md",
 )
-CURVES, QUALITY, BOUND = "curves-version-2", "quality-75", "bound-0.1-percent"  # files of results
+QUALITY, BOUND = "quality-75", "bound-0.1-percent"  # files of results
+MEASURED = {"kg": "KG", "sted": "STED", "max": "largest error"}  # of the leaderboard
 MARKED = re.compile(r"(<!-- table: ([\w.-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 NAMES = {
     "mcgv:prediction=affine": "`mcgv` affine",
@@ -53,7 +55,7 @@ SYSTEMS = (
     *("mcgv", "mcgv:prediction=affine", "mcgv:prediction=affine:image=jpeg", "pca", "laplacian", "pdct"),
     *("pca:predictor=rbf", "pca:predictor=navg", "laplacian:operator=mean-value:delta_prediction=rigid", "pdct:clusters=40"),
     *("afxic", "coddyac", "cpca", "d3dmc", "dynapack", "dynapack:predictor=replica", "dynapack:predictor=space"),
-    *("kglpc", "kglpc:taps=0", "pcaanim", "rt"),
+    *("famc", "gv", "gv:prediction=none", "kglpc", "kglpc:taps=0", "maverg", "pcaanim", "rt"),
 )  # codecs of docs/reproduction.md
 SCALES = ("mcgv", "mcgv-affine", "pca", "laplacian", "pdct")  # files of scale/
 COSTS = {"encode_cpu_s": "encode", "decode_cpu_s": "decode"}
@@ -100,16 +102,14 @@ def errors_at_quality() -> list[str]:
     return table(("sequence", *heads_of(found)), rows)
 
 
-def rates_at(level: str) -> list[str]:
-    """Rates of all codecs at a KG error."""
-    results = load(CURVES)
-    found = curves_of(results)
-    rows = []
-    for sequence, codecs in found.items():
-        stated = results.get("rates", {}).get(sequence, {})
-        cells = [rate_cell(points, stated.get(codec, {}).get(level), float(level)) for codec, points in codecs.items()]
-        rows.append((sequence, *cells, number(results.get("vdmc", {}).get(sequence, {}).get(level), ".2f")))
-    return table(("sequence", *heads_of(found), "V-DMC base mesh"), rows)
+def curves() -> dict[str, dict[str, Points]]:
+    """Points by sequence and codec, of all files of ``curves``."""
+    return points_by([curve for report in curve_reports() for curve in report.curves])
+
+
+def curve_reports() -> list[BenchReport]:
+    """What ``tools/measure_curves.py`` wrote."""
+    return [BenchReport.read(path) for path in sorted((DOCS / "benchmarks" / "curves").glob("*.json"))]
 
 
 def rates_at_bound() -> list[str]:
@@ -126,41 +126,6 @@ def rates_at_bound() -> list[str]:
     mean = math.exp(sum(logarithms) / len(logarithms))
     heads = ("sequence", *heads_of(curves_of(results)), "others, best first", "best of ours to best of others")
     return table(heads, [*rows, ("geometric mean", *"---", f"{100 * mean:.0f} %")])
-
-
-def rate_cell(points: Points, stated: float | None, error: float) -> str:
-    """A rate; the coarsest file's where that is better already, with its error; "-" where none is as good."""
-    rate = stated or rate_at(points, "kg", error)
-    coarsest = max(points, key=lambda point: float(point["kg"]))
-    if rate is None and coarsest["kg"] < error:
-        return f"<= {coarsest['bpvf']:.3f} ({coarsest['kg']:.2f})"
-    return number(rate, ".3f")
-
-
-def differences(measure: str) -> list[str]:
-    """Average differences of rate to `ANCHOR` at equal error, and the mean of their logarithms."""
-    results = load(CURVES)
-    found, given = curves_of(results), results.get(f"{measure}_differences", {})
-    heads = [head for head in heads_of(found) if head != f"`{ANCHOR}`"]
-    rows = []
-    for sequence, codecs in found.items():
-        stated = given.get(sequence, {})
-        others = {codec: points for codec, points in codecs.items() if codec != ANCHOR}
-        rows.append(
-            [stated.get(codec) or average_rate_difference(codecs[ANCHOR], own, measure) for codec, own in others.items()]
-        )
-    means = [mean_difference([value for value in column if value is not None]) for column in zip(*rows, strict=True)]
-    lines = [
-        (name, *(number(value, "+.0f", " %") for value in row))
-        for name, row in zip([*found, "mean"], [*rows, means], strict=True)
-    ]
-    return table(("sequence", *heads), lines)
-
-
-def mean_difference(differences: list[float]) -> float | None:
-    """The mean of differences of rate, percent, by their logarithms."""
-    logarithms = [math.log1p(value / 100) for value in differences]
-    return 100 * math.expm1(sum(logarithms) / len(logarithms)) if logarithms else None
 
 
 def scale_report() -> ScaleReport:
@@ -277,12 +242,13 @@ def name_of(codec: str) -> str:
 TABLES: dict[str, Callable[[], list[str]]] = {
     "default-against-published": default_against_published,
     "errors-at-quality-75": errors_at_quality,
-    "rates-at-kg-1": lambda: rates_at("1"),
-    "rates-at-kg-0.3": lambda: rates_at("0.3"),
-    "rates-at-kg-0.1": lambda: rates_at("0.1"),
     "rates-at-bound": rates_at_bound,
-    "differences-kg": lambda: differences("kg"),
-    "differences-sted": lambda: differences("sted"),
+    "curves-leaders": lambda: leaders(curves(), ANCHOR, MEASURED),
+    "curves-rates-kg-1": lambda: rates(curves(), ANCHOR, "kg", 1.0),
+    "curves-rates-kg-0.1": lambda: rates(curves(), ANCHOR, "kg", 0.1),
+    "curves-differences-kg": lambda: differences(curves(), ANCHOR, "kg"),
+    "curves-differences-sted": lambda: differences(curves(), ANCHOR, "sted"),
+    "curves-matrix-kg": lambda: matrix(curves(), ANCHOR, "kg"),
     "reproduction-states": reproduced_states,
     "reproduction-mcgv": lambda: reproduced("mcgv"),
     "reproduction-pca": lambda: reproduced("pca"),
@@ -324,13 +290,15 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     points = commands.add_parser("points", help="print every point of a file of results")
     points.add_argument("file", metavar="FILE.json")
-    commands.add_parser("plots", help="draw the pictures of docs/scale.md")
+    commands.add_parser("plots", help="draw the pictures of docs/scale.md and docs/curves.md")
     options = parser.parse_args()
     if options.command == "points":
         print(tables(BenchReport.read(options.file).curves))
         return
     if options.command == "plots":
         draw(scale_report(), DOCS / "plots")
+        for report in curve_reports():
+            draw_curves(report, DOCS / "plots")
         return
     for page in PAGES:
         page.write_text(fill(page.read_text("utf-8")), "utf-8")

@@ -98,6 +98,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
         LONGS,
         [SCALAR] * 3,
         "bool",
+        "bool",
     ],
     "gvpipe.connectivity.edge_seam_kernels.visit_corners": [SEAMS, LONGS, LONGS, LONGS, SCALAR],
     "gvpipe.attributes.linear_kernels.code_linear": [

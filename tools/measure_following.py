@@ -1,19 +1,24 @@
-"""Bytes and surface errors of captures: followed and coded, against Draco frame by frame, as it came and decimated.
+"""Bytes and surface errors of captures: followed and coded, against Draco and gltfpack frame by frame.
 
-    python tools/measure_following.py dancer/ thomas/ collision/ --kg 0.1 0.15 0.2 --bits 9 10 11
+    python tools/measure_following.py dancer/ thomas/ collision/ --kg 0.1 0.15 0.2 --bits 9 10 11 --gltfpack 'npx gltfpack'
 
-A folder has one OBJ file for each frame. Errors are parts of the diagonal of the first frame's box: the mean over frames of the
-root mean square and of the 99 % quantile, and the largest of all (`gvpipe.metrics.surface`). Bytes are of whole files, one for
-each run. Seconds are of processor time for a frame: following alone, or coding with Draco.
+A folder has one OBJ file for each frame. Draco and gltfpack code it as it came, and decimated. Errors are parts of the diagonal
+of the first frame's box: the mean over frames of the root mean square and of the 99 % quantile, and the largest of all
+(`gvpipe.metrics.surface`). Bytes are of whole files, one for each run. Seconds are of processor time for a frame: following
+alone, or coding by the others (gltfpack with its start). gltfpack writes a GLB for each frame: `-cc`, positions of as many
+bits; a server may deflate it further.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
+import shlex
+import subprocess
 import tempfile
-import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 import DracoPy
@@ -62,7 +67,11 @@ def main() -> None:
     parser.add_argument("--codec", default="pca")
     parser.add_argument("--kg", nargs="*", type=float, default=[0.1, 0.15, 0.2], help="Karni-Gotsman errors of runs")
     parser.add_argument("--bits", nargs="*", type=int, default=[9, 10, 11], help="of Draco")
+    parser.add_argument("--gltfpack", metavar="COMMAND", type=shlex.split, help="such as 'npx gltfpack'; else it is left out")
     chosen = parser.parse_args()
+    coders: list[tuple[str, Callable[[Mesh, int], bytes], Callable[[bytes], Mesh]]] = [("Draco", _draco, _decode_draco)]
+    if chosen.gltfpack:
+        coders.append(("gltfpack", partial(_gltfpack, chosen.gltfpack), _decode_glb))
     print(
         "| capture | method | bytes a frame | rms | 99 % | largest | seconds a frame |\n|---|---|---|---|---|---|---|",
         flush=True,
@@ -71,21 +80,22 @@ def main() -> None:
         frames = ObjFolder(folder)
         points = frames[0][0]
         scale = Scale(float(np.linalg.norm(np.ptp(points, axis=0))), points.min(axis=0), 1.0)
-        begin = time.process_time()
+        begin = _seconds()
         runs = list(follow(frames, rms=chosen.rms, max_error=chosen.max_error))
-        seconds = (time.process_time() - begin) / len(frames)
+        seconds = (_seconds() - begin) / len(frames)
         _row(folder.name, f"followed: {_describe(runs)}", np.nan, _errors(_meshes(runs), frames, scale), seconds)
         for kg in chosen.kg:
             size, decoded = _code(runs, chosen.codec, kg)
             _row(folder.name, f"`{chosen.codec}`, KG {kg:g}", size / len(frames), _errors(decoded, frames, scale), seconds)
-        for name, share in (("Draco", 0.0), ("Draco, decimated", 0.75)):
-            for bits in chosen.bits:
-                begin = time.process_time()
-                coded = [_draco(frames[k], bits, share * chosen.rms, scale.diagonal) for k in range(len(frames))]
-                seconds = (time.process_time() - begin) / len(frames)
-                meshes = (_decode_draco(each) for each in coded)
-                n_bytes = sum(map(len, coded)) / len(frames)
-                _row(folder.name, f"{name}, {bits} bits", n_bytes, _errors(meshes, frames, scale), seconds)
+        for name, encode, decode in coders:
+            for words, share in ((name, 0.0), (f"{name}, decimated", 0.75)):
+                for bits in chosen.bits:
+                    begin = _seconds()
+                    meshes = (_decimated(frames[k], share * chosen.rms, scale.diagonal) for k in range(len(frames)))
+                    coded = [encode(mesh, bits) for mesh in meshes]
+                    seconds = (_seconds() - begin) / len(frames)
+                    n_bytes = sum(map(len, coded)) / len(frames)
+                    _row(folder.name, f"{words}, {bits} bits", n_bytes, _errors(map(decode, coded), frames, scale), seconds)
 
 
 def _describe(runs: list[Run]) -> str:
@@ -120,18 +130,46 @@ def _code(runs: list[Run], codec: str, kg: float) -> tuple[int, list[Mesh]]:
     return size, decoded
 
 
-def _draco(mesh: Mesh, bits: int, rms: float, diagonal: float) -> bytes:
-    points, faces = mesh
-    if rms:
-        surface = key_mesh(Surface(points, faces), diagonal, SurfaceError(rms, np.inf), None)
-        points, faces = surface.positions, surface.faces
-    coded: bytes = DracoPy.encode(points, faces, quantization_bits=bits, compression_level=10)
+def _decimated(mesh: Mesh, rms: float, diagonal: float) -> Mesh:
+    """A mesh with as few triangles as lie within ``rms``, part of the diagonal; the mesh itself for 0."""
+    if not rms:
+        return mesh
+    surface = key_mesh(Surface(*mesh), diagonal, SurfaceError(rms, np.inf), None)
+    return surface.positions, surface.faces
+
+
+def _draco(mesh: Mesh, bits: int) -> bytes:
+    coded: bytes = DracoPy.encode(*mesh, quantization_bits=bits, compression_level=10)
     return coded
 
 
 def _decode_draco(coded: bytes) -> Mesh:
     mesh = DracoPy.decode(coded)
     return np.asarray(mesh.points, np.float64), np.asarray(mesh.faces, np.int32)
+
+
+def _gltfpack(command: list[str], mesh: Mesh, bits: int) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        given, packed = Path(folder) / "frame.glb", Path(folder) / "packed.glb"
+        points, faces = mesh
+        gvpipe.write(gvpipe.MeshSequence(points[None].astype(np.float32), faces, 30.0), given)
+        options = ["-cc", "-vp", str(bits), "-i", str(given), "-o", str(packed)]
+        subprocess.run([*command, *options], check=True, stdout=subprocess.DEVNULL)
+        return packed.read_bytes()
+
+
+def _decode_glb(coded: bytes) -> Mesh:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "frame.glb"
+        path.write_bytes(coded)
+        mesh = gvpipe.read(path)
+        return mesh.read_absolute(0, 1)[0], np.asarray(mesh.faces)
+
+
+def _seconds() -> float:
+    """Of processor time, with programs that were started."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def _errors(meshes: Iterable[Mesh], frames: ObjFolder, scale: Scale) -> list[SurfaceErrors]:

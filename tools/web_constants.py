@@ -21,7 +21,8 @@ SHARED = {
     "gvpipe.asset_coding.directory": "SECTION VERSION MOST MAX_BYTES SURFACE OCTAHEDRAL REDUCED",
     "gvpipe.asset_coding.encoder": "ARRANGEMENT CODED",
     "gvpipe.asset_coding.times": "SECTION",
-    "gvpipe.asset_coding.volume_list": "SECTION CELLS ORDER POINTS VERSION IN_ORDER BY_WALK MAX_BYTES MOST_CELLS MOST_POINTS",
+    "gvpipe.asset_coding.volume_list": "SECTION CELLS ORDER POINTS VERSION IN_ORDER BY_WALK BY_CORNERS "
+    "MAX_BYTES MOST_CELLS MOST_POINTS",
     "gvpipe.asset_coding.volume_reader": "BYTES_PER_CELL SECONDS_PER_CELL BYTES_PER_POINT SECONDS_PER_POINT",
     "gvpipe.attributes.linear_kernels": "AFFINE PARALLELOGRAM",
     "gvpipe.attributes.match_kernels": "N_MATCH_CONTEXTS N_RESIDUAL_CONTEXTS",
@@ -34,6 +35,8 @@ SHARED = {
     "gvpipe.connectivity.adaptive_order": "MAX_VERTICES",
     "gvpipe.connectivity.base_mesh": "DRACO_PREFIX MAX_PER_BYTE",
     "gvpipe.connectivity.cell_kernels": "N_CONTEXTS",
+    "gvpipe.connectivity.cell_middles": "MIDDLES",
+    "gvpipe.connectivity.cell_traversal": "KEEPS RANKED",
     "gvpipe.connectivity.cell_poses": "KINDS MOST_POSES MOST_NODES MOST_FACES",
     "gvpipe.connectivity.edge_seam_kernels": "CONTEXTS DECODE",
     "gvpipe.connectivity.order_kernels": "N_CONTEXTS N_GROUPS",

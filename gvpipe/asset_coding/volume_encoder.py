@@ -13,11 +13,26 @@ from gvpipe.asset_coding.directory import CODED, REDUCED, entry_of
 from gvpipe.asset_coding.field_plan import FieldPlan, plan_field
 from gvpipe.asset_coding.options import AssetOptions
 from gvpipe.asset_coding.reduction import NO_REDUCTION
-from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, IN_ORDER, ORDER, POINTS, SECTION, VolumeList, pack_volume
+from gvpipe.asset_coding.volume_list import (
+    AS_POLYHEDRA,
+    BY_CORNERS,
+    BY_WALK,
+    CELLS,
+    IN_ORDER,
+    ORDER,
+    PLAIN_VERSION,
+    POINTS,
+    SECTION,
+    VERSION,
+    VolumeList,
+    pack_volume,
+)
 from gvpipe.asset_coding.volume_rows import VolumeRows
 from gvpipe.coding.codec import FrameReader
-from gvpipe.connectivity.cell_traversal import encode_walk
+from gvpipe.connectivity.cell_poses import KINDS
+from gvpipe.connectivity.cell_traversal import RANKED, encode_walk
 from gvpipe.connectivity.cells import encode_cells, encode_order
+from gvpipe.connectivity.polyhedral_cells import encode_polyhedral
 from gvpipe.fields.encoder import encode_field
 from gvpipe.fields.graph import FieldGraph
 from gvpipe.fields.values import FieldBound
@@ -113,7 +128,10 @@ class VolumeCoder:
                 some = plan._replace(field=field.select(chosen[domain]))
                 made[section] = _coded(name, some, rows.graphs[domain], n_beside + sum(map(len, made.values())))
         unmoved = frozenset((plan.field.domain, name) for name, plan in self._plans if len(plan.field) == 1)
-        about = VolumeList(len(cells.types), volume.n_points, bound, volume.blocks, tuple(listed), unmoved)
+        is_plain = made[CELLS][0] == IN_ORDER or (made[CELLS][0] == BY_WALK and made[CELLS][1] < RANKED)
+        version = PLAIN_VERSION if is_plain else VERSION
+        counts, is_free = (len(cells.types), volume.n_points), cells.polyhedra is not None
+        about = VolumeList(*counts, bound, volume.blocks, tuple(listed), unmoved, version, is_free)
         return {SECTION: pack_volume(about), **made}
 
     def _code_cells(self, shown: Shown, reorder: bool) -> tuple[Cells, Int64, Int64, dict[str, bytes]]:
@@ -122,9 +140,16 @@ class VolumeCoder:
         inner = np.arange(volume.n_points)
         place = np.argsort(shown.permutation)  # permutations are undone by sorting
         renamed = np.concatenate([place, n_vertices + inner])
-        cells = Cells(volume.cells.types, volume.cells.offsets, renamed[volume.cells.nodes])
+        cells = volume.cells.renumbered(renamed)
         order = np.arange(len(renamed)) if volume.order is None else volume.order
         order = np.concatenate([order[:n_vertices][shown.permutation], order[n_vertices:]])
+        if cells.polyhedra is not None:
+            section, points = encode_polyhedral(cells, shown.faces, shown.polygons, (n_vertices, len(order)), not reorder)
+            made = {CELLS: bytes([AS_POLYHEDRA]) + section, ORDER: encode_order(None if reorder else order, n_vertices)}
+            if reorder:
+                inner = points[n_vertices:] - n_vertices
+                cells = cells.renumbered(np.argsort(points))
+            return cells, np.arange(len(cells.types)), inner, made
         keeps = not reorder or bool(volume.blocks)
         in_order = bytes([IN_ORDER]) + encode_cells(Cells(cells.types, cells.offsets, order[cells.nodes]))
         walked = encode_walk(cells, shown.faces, shown.polygons, (n_vertices, len(order)), keeps)
@@ -132,7 +157,7 @@ class VolumeCoder:
         sources = np.arange(len(cells.types))
         if walked is not None and len(walked[0]) < len(in_order):
             section, walk = walked
-            made[CELLS] = bytes([BY_WALK]) + section
+            made[CELLS] = bytes([BY_WALK if np.isin(cells.types, KINDS).all() else BY_CORNERS]) + section
             if not keeps:
                 made[ORDER] = encode_order(None, n_vertices)
                 cells, sources, inner = walk.cells, walk.sources, walk.points[n_vertices:] - n_vertices

@@ -16,8 +16,8 @@ from gvpipe.container.json_object import pack_json, unpack_json
 from gvpipe.foundation.budget import UNLIMITED, Budget
 
 SECTION, CELLS, ORDER, POINTS = "volume", "volume.cells", "volume.order", "volume.points"
-VERSION = 1
-IN_ORDER, BY_WALK = 0, 1  # first byte of `CELLS`: how they are coded
+VERSION, PLAIN_VERSION = 2, 1  # newest; of cells that are coded by the first two ways
+IN_ORDER, BY_WALK, BY_CORNERS, AS_POLYHEDRA = 0, 1, 2, 3  # first byte of `CELLS`: how they are coded
 MAX_BYTES = 1 << 24
 MOST_CELLS = 1 << 30
 MOST_POINTS = 1 << 24
@@ -35,6 +35,7 @@ class VolumeList:
         numbers: of points and of cells; those whose name is in ``unmoved`` have one frame.
         unmoved: domains and names.
         version: of the section.
+        has_polyhedra: whether cells are coded as lists of faces.
     """
 
     cells: int
@@ -43,17 +44,19 @@ class VolumeList:
     blocks: tuple[tuple[str, int], ...] = ()
     numbers: tuple[Listed, ...] = ()
     unmoved: frozenset[tuple[str, str]] = frozenset()
-    version: int = VERSION
+    version: int = PLAIN_VERSION
+    has_polyhedra: bool = False
 
 
 def pack_volume(listed: VolumeList) -> bytes:
     """Return the section."""
     return pack_json(
         {
-            "version": VERSION,
+            "version": listed.version,
             "cells": listed.cells,
             "points": listed.points,
             "bound": listed.bound,
+            **({"polyhedra": True} if listed.has_polyhedra else {}),
             "blocks": [{"name": name, "cells": count} for name, count in listed.blocks],
             "numbers": [
                 {**listed_values(each), "moves": (each.domain, each.name) not in listed.unmoved} for each in listed.numbers
@@ -80,4 +83,4 @@ def unpack_volume(data: bytes, budget: Budget = UNLIMITED) -> VolumeList:
     if len({(each.domain, each.name) for each in numbers}) != len(numbers):
         raise values.corrupt("two numbers of points or of cells have one name")
     points, bound = values.integer("points", 0, MOST_POINTS), values.number("bound", 0, 3.5e38)
-    return VolumeList(n_cells, points, bound, blocks, tuple(numbers), frozenset(unmoved))
+    return VolumeList(n_cells, points, bound, blocks, tuple(numbers), frozenset(unmoved), version)

@@ -12,7 +12,19 @@ from gvpipe.asset.field import Field
 from gvpipe.asset_coding.directory import CODED, REDUCED, Listed
 from gvpipe.asset_coding.field_values import Decode, FieldValues
 from gvpipe.asset_coding.reduction import NO_REDUCTION
-from gvpipe.asset_coding.volume_list import BY_WALK, CELLS, IN_ORDER, ORDER, POINTS, SECTION, VERSION, VolumeList, unpack_volume
+from gvpipe.asset_coding.volume_list import (
+    AS_POLYHEDRA,
+    BY_CORNERS,
+    BY_WALK,
+    CELLS,
+    IN_ORDER,
+    ORDER,
+    POINTS,
+    SECTION,
+    VERSION,
+    VolumeList,
+    unpack_volume,
+)
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.arrays import Array, Int32
 from gvpipe.foundation.errors import InputError, corrupt_section
@@ -20,7 +32,7 @@ from gvpipe.grids.volume import Volume
 from gvpipe.runtime.forks import ForkLock
 
 BYTES_PER_CELL, SECONDS_PER_CELL = 1200, 6e-6  # of faces, edges and the graph
-BYTES_PER_POINT, SECONDS_PER_POINT = 1500, 8e-6
+BYTES_PER_POINT, SECONDS_PER_POINT = 700, 8e-6
 
 
 def read_volume_list(bitstream: Bitstream) -> VolumeList | None:
@@ -67,6 +79,7 @@ class _VolumeReader:
         from gvpipe.asset_coding.volume_rows import VolumeRows
         from gvpipe.connectivity.cell_traversal import decode_walk
         from gvpipe.connectivity.cells import decode_cells, decode_order
+        from gvpipe.connectivity.polyhedral_cells import decode_polyhedral
         from gvpipe.grids.cells import Cells
 
         self._bitstream, self._listed, self._path = bitstream, listed, path
@@ -78,14 +91,17 @@ class _VolumeReader:
         budget.keep("the volume", memory, SECONDS_PER_CELL * listed.cells + SECONDS_PER_POINT * n_points)
         self._order = decode_order(bitstream.section(ORDER), n_vertices, n_points, ORDER, budget)
         data = bitstream.section(CELLS)
-        is_walk = data[:1] == bytes([BY_WALK])
-        if not is_walk and data[:1] != bytes([IN_ORDER]):
+        if data[:1] not in (bytes([way]) for way in (IN_ORDER, BY_WALK, BY_CORNERS, AS_POLYHEDRA)):
             raise corrupt_section(CELLS, f"it is coded by way {data[:1].hex() or 'none'}")
-        if is_walk:
-            cells = decode_walk(data[1:], surface, (n_vertices, n_points), listed.cells, CELLS, budget)
+        counts = n_vertices, n_points
+        if data[0] == AS_POLYHEDRA:
+            cells = decode_polyhedral(data[1:], surface, counts, listed.cells, CELLS, budget)
+        elif data[0] != IN_ORDER:
+            is_linear = data[0] == BY_WALK
+            cells = decode_walk(data[1:], surface, counts, listed.cells, CELLS, budget, is_linear=is_linear)
         else:
             cells = decode_cells(data[1:], listed.cells, n_points, CELLS, budget)
-        if self._order is not None and not is_walk:
+        if self._order is not None and data[0] == IN_ORDER:
             row = np.empty(n_points, np.int64)
             row[self._order] = np.arange(n_points)
             cells = Cells(cells.types, cells.offsets, row[cells.nodes])

@@ -1,7 +1,8 @@
 """Which sequences an input of many names, and which file each becomes.
 
 A scene, an archive, a point cache or a simulation is a sequence. Frame files (OBJ, PLY, ...) are one with the others of their
-folder and format. Outputs keep the folders below the part of a glob that has no wildcard, or below a folder that is given.
+folder and format; those that a list of time steps (.pvd, .series) names are its own. Outputs keep the folders below the part of
+a glob that has no wildcard, or below a folder that is given.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import glob
 import os
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from gvpipe.io import READERS
 from gvpipe.io.formats import FRAME_FORMATS
 
 VIDEO_SUFFIXES = (".mp4", ".m4v")
+LISTS = (".pvd", ".series")
 LISTED = 3  # files that a message names
 
 
@@ -69,7 +72,10 @@ def find_jobs(sources: Sequence[StrPath], folder: StrPath) -> Found:
         check_source(source)
         n_before = len(jobs) + len(left_out)
         root, files = _list(source)
+        covered = _in_lists(files)
         for file in files:
+            if os.path.realpath(file) in covered:
+                continue
             if file.lower().endswith((*VIDEO_SUFFIXES, NAME)) and os.path.realpath(file).startswith(own + os.sep):
                 continue  # an output of another run, or its manifest
             job = _job(root, file)
@@ -101,6 +107,18 @@ def _list(source: str) -> tuple[str, list[str]]:
         else:
             files.add(match)
     return _fixed_part(source), sorted(files)
+
+
+def _in_lists(files: Sequence[str]) -> set[str]:
+    """Files that lists of time steps among them name, which are no sequences of their own; real paths."""
+    from gvpipe.io.simulation.step_lists import listed_files
+
+    found: set[str] = set()
+    for file in files:
+        if file.lower().endswith(LISTS):
+            with suppress(InputError):  # which is told when the list is encoded
+                found.update(os.path.realpath(each) for each in listed_files(Path(file)))
+    return found
 
 
 def _fixed_part(pattern: str) -> str:

@@ -24,6 +24,7 @@ AXES = {"kg": "KG error, %", "rmse_diag": "rmse, part of the diagonal", "sted": 
 PEER_COLUMNS = {"kg": "kg", "rmse_diag": "rmse_rel"}
 SIZE = (15.0, 6.0)  # inches
 LEGEND_COLUMNS = 6
+MARKERS = "os^"  # of the first ten codecs, of the next
 
 Peers = dict[str, dict[str, list[dict[str, float]]]]  # sequence -> codec -> points
 
@@ -73,7 +74,8 @@ def _draw_sequence(name: str, curves: list[Curve], peers: dict[str, list[dict[st
     ours, theirs = colormaps["tab10"], colormaps["tab20c"]
     lines: list[tuple[str, list[dict[str, Any]], dict[str, Any]]] = []
     for i, curve in enumerate(curves):
-        lines.append((curve.codec, curve.points, {"color": ours(i % 10), "marker": "o", "linewidth": 2.0, "zorder": 3}))
+        marker = MARKERS[i // 10 % len(MARKERS)]
+        lines.append((curve.codec, curve.points, {"color": ours(i % 10), "marker": marker, "linewidth": 2.0, "zorder": 3}))
     for i, (codec, points) in enumerate(peers.items()):
         style = {"color": theirs(i % 20), "marker": "x", "linestyle": "--", "linewidth": 1.0, "markersize": 4}
         lines.append((codec, points, style))

@@ -33,7 +33,7 @@ def _points(curves: Sequence[Curve]) -> list[str]:
                 _text(p.get("frame_ms"), ".1f"),
                 _text(curve.peak_mb, ".0f"),
             )
-            lines.append(_row((curve.sequence, curve.codec, f"{p['quality']:g}", *numbers)))
+            lines.append(_row((curve.sequence, curve.codec, _text(p["quality"], "g"), *numbers)))
     return lines
 
 

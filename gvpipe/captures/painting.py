@@ -23,10 +23,9 @@ from gvpipe.foundation.arrays import UInt8
 from gvpipe.foundation.errors import InputError
 from gvpipe.model.moving_texture import with_pictures
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rasterizer.surface_colours import SurfaceColours
+from gvpipe.rasterizer.surface_colours import COLOUR, SurfaceColours, has_paint, used_materials
 from gvpipe.runtime.ahead import run_ahead
 
-COLOUR = "color"
 UV = "uv"
 IMAGE = "colours"
 PER_VERTEX = 16.0  # texels for each vertex of a frame whose vertices have the colours: a video has a quarter as many of hue
@@ -34,14 +33,6 @@ MOST_TEXELS = 1 << 24  # of an atlas: 4096 x 4096
 BLOCK = 1 << 16  # texels that are painted at a time
 KEPT = "--track off keeps pictures as they are"
 UNSEEN = 128  # level of texels that no triangle shows, which the coder fills
-
-
-def has_paint(frame: MeshSequence) -> bool:
-    """Whether a frame's colours differ from place to place: by pictures, by vertices or by materials."""
-    used = _used_materials(frame)
-    colour = frame.attributes.get(COLOUR)
-    has_colours = colour is not None and colour.kind == COLOUR and colour.domain != "part"
-    return has_colours or any(each.base_color_texture for each in used) or len({each.base_color for each in used}) > 1
 
 
 def paint_names(frame: MeshSequence) -> set[str]:
@@ -55,7 +46,14 @@ def left_of_looks(frame: MeshSequence) -> list[str]:
     lost = [role.replace("_", " ") for role in sorted(roles)]
     shown = {each.base_color_texture.image for each in frame.materials if each.base_color_texture is not None}
     lost += ["pictures that cannot be decoded"] if any(frame.images[number].size is None for number in shown) else []
-    return lost + (["alpha"] if any(each.alpha_mode != "opaque" for each in frame.materials) else [])
+    lost += ["alpha"] if any(each.alpha_mode != "opaque" for each in frame.materials) else []
+    return lost + (["materials but the first"] if len({_but_colour(each) for each in used_materials(frame)}) > 1 else [])
+
+
+def _but_colour(material: Material) -> Material:
+    """What of a material is one for all of a followed mesh."""
+    bare = with_uv((material,), ())[0]
+    return replace(bare, name="", base_color=(1.0, 1.0, 1.0, 1.0), alpha_mode="opaque", alpha_cutoff=0.5)
 
 
 def picture_size(sequence: MeshSequence) -> tuple[int, int]:
@@ -75,7 +73,7 @@ def with_looks(sequence: MeshSequence, followed: FollowedFrames) -> MeshSequence
         InputError: xatlas hung or died.
     """
     key = followed.frames.frame(followed.key)
-    used = _used_materials(key)
+    used = used_materials(key)
     if not used and not has_paint(key):
         return sequence
     material = with_uv((used[0],), ())[0] if used else Material(name=IMAGE, double_sided=True)
@@ -87,11 +85,6 @@ def with_looks(sequence: MeshSequence, followed: FollowedFrames) -> MeshSequence
     opaque = replace(material, base_color=(1.0, 1.0, 1.0, 1.0), alpha_mode="opaque")
     bare = replace(sequence, attributes={**sequence.attributes, UV: uv}, materials=(opaque,), parts=(part,))
     return with_pictures(bare, FollowedPictures(followed, atlas), IMAGE)
-
-
-def _used_materials(frame: MeshSequence) -> list[Material]:
-    numbers = {part.material for part in frame.parts if part.material is not None and part.triangles[0] < part.triangles[1]}
-    return [frame.materials[number] for number in sorted(numbers)]
 
 
 def _n_texels(frame: MeshSequence) -> float:

@@ -22,6 +22,7 @@ LONG = 8  # frames of a shot that is kept as it is
 SHARE = 0.6  # of a largest distance that is asked for: what following may use, and coding the rest
 RMS_SHARE = 0.3  # of the same: the greatest rms
 CODED_RMSE = 0.0005  # of vertices, part of the diagonal; most of it lies along the surface
+CODED_LARGEST = 0.0025  # of vertices: what coding may always add; more, where following leaves more of `MAX_ERROR`
 SURFACE_ALONE = "only the surface is followed"
 
 Targets = tuple[float | None, float | None, float | None, float | str | None]
@@ -35,17 +36,28 @@ class Tracked:
     Args:
         capture: the shots that there are now.
         keys: of each shot, the frame of the capture that its mesh comes from; None: it is as it came.
+        largest: of each shot, the greatest distance between its surface and those of its frames, part of the diagonal.
         notes: what a user should know, a line each.
     """
 
     capture: Capture
     keys: tuple[int | None, ...]
+    largest: tuple[float, ...]
     notes: tuple[str, ...]
 
     @property
     def is_any(self) -> bool:
         """Whether a shot was followed."""
         return any(key is not None for key in self.keys)
+
+
+def coded_largest(followed: float) -> float:
+    """The greatest error of a vertex that coding may add where nobody asks for another, part of the diagonal.
+
+    Args:
+        followed: the greatest distance that following leaves, part of the diagonal.
+    """
+    return max(MAX_ERROR - followed, CODED_LARGEST)
 
 
 def coding_targets(targets: Targets, is_followed: bool) -> Targets:
@@ -66,8 +78,13 @@ def is_tracked_by_default(capture: Capture) -> bool:
     alone = sum(length == 1 for length in capture.lengths)
     if len(capture) <= 2 or 2 * alone <= len(capture):
         return False
-    first = capture.shots[0]
-    return not what_is_lost(first) and not first.fields
+    return not any(shot.fields for shot in capture.shots) and not _losses(capture)
+
+
+def _losses(capture: Capture) -> list[str]:
+    """What following leaves behind of any shot, by name."""
+    painted = set().union(*map(paint_names, capture.shots))  # coordinates, also in a frame whose picture is missing
+    return list(dict.fromkeys(name for shot in capture.shots for name in what_is_lost(shot) if name not in painted))
 
 
 def what_is_lost(shot: MeshSequence) -> list[str]:
@@ -99,40 +116,44 @@ def track(capture: Capture, max_error: float | None, vertices: int | None, progr
     rms = RMS if max_error is None else min(RMS, RMS_SHARE * max_error)
     shots: list[MeshSequence] = []
     keys: list[int | None] = []
+    largest: list[float] = []
+    losses: list[list[str]] = []
     progress("follow", 0.0)
-    worst_rms, worst, followed, size = 0.0, 0.0, 0, (0, 0)
+    worst_rms, followed, size = 0.0, 0, (0, 0)
     for is_long, span in _stretches(capture):
         if is_long:
             shots += [capture.shots[number] for number in span]
             keys += [None] * len(span)
+            largest += [0.0] * len(span)
             continue
         start, stop = capture.starts[span[0]], capture.starts[span[-1]] + capture.lengths[span[-1]]
         frames = CaptureFrames(capture.part(start, stop))
         for run in follow(frames, max_error=bound, rms=rms, vertices=vertices, progress=progress):
             keys.append(None if run.key is None else start + run.key)
-            shots.append(capture.frame(start + run.start) if run.key is None else _shot(capture, start, run, frames.origin))
-            size = max(size, picture_size(shots[-1]) if run.key is not None else size)
-            if run.key is not None:
+            largest.append(0.0 if run.key is None else max(error.largest for error in run.errors))
+            if run.key is None:
+                shots.append(capture.frame(start + run.start))
+            else:
+                shot, lost = _shot(capture.part(start + run.start, start + run.stop), run, frames.origin)
+                shots.append(shot)
+                losses.append(lost)
+                size = max(size, picture_size(shot))
                 followed += run.stop - run.start
                 worst_rms = max(worst_rms, *(error.rms for error in run.errors))
-                worst = max(worst, *(error.largest for error in run.errors))
     notes = []
     if followed:
         runs = sum(key is not None for key in keys)
-        distance = f"rms {worst_rms:.2g}, at most {worst:.2g} of the diagonal"
+        distance = f"rms {worst_rms:.2g}, at most {max(largest):.2g} of the diagonal"
         alone = len(capture) - followed
         notes.append(
             f"{count(followed, 'frame')} follow {count(runs, 'key mesh', 'key meshes')}: {distance}; "
             f"{alone} are as they came (--track off: all)"
         )
         notes += [f"colours of each frame become textures that move, of up to {size[0]}x{size[1]} texels"] if size[0] else []
-        first = capture.shots[0]
-        lost = what_is_lost(first)
-        kept = [shot.fields for shot, key in zip(shots, keys, strict=True) if key is not None]
-        lost += [name for name in first.fields if not all(name in fields for fields in kept)]
-        notes += [f"{SURFACE_ALONE}; left out: {', '.join(lost)}"] if lost else []
+        left_out = dict.fromkeys(name for names in losses for name in names)
+        notes += [f"{SURFACE_ALONE}; left out: {', '.join(left_out)}"] if left_out else []
     found = Capture(shots, capture.name, fps=capture.fps, lengths=[len(shot) for shot in shots], sound=capture.sound)
-    return Tracked(found, tuple(keys), tuple(notes))
+    return Tracked(found, tuple(keys), tuple(largest), tuple(notes))
 
 
 class CaptureFrames:
@@ -157,14 +178,29 @@ def _stretches(capture: Capture) -> Iterator[tuple[bool, list[int]]]:
         yield is_long, list(numbers)
 
 
-def _shot(capture: Capture, start: int, run: Run, origin: Float64) -> MeshSequence:
-    """A run of ``capture`` whose first frame is ``start + run.start``, with the looks and fields of its frames."""
-    first = capture.frame(start + run.start)
+def _shot(frames: Capture, run: Run, origin: Float64) -> tuple[MeshSequence, list[str]]:
+    """A run with the looks and fields of its ``frames``, and names of what it leaves out of them."""
+    first = frames.shots[0]
     metadata = first.metadata
     if metadata.times:
-        times = tuple(float(capture.frame(start + k).times[0]) for k in range(run.start, run.stop))
+        times = tuple(float(frames.frame(k).times[0]) for k in range(len(frames)))
         metadata = replace(metadata, times=times)
-    followed = FollowedFrames(capture.part(start + run.start, start + run.stop), origin, run)
+    followed = FollowedFrames(frames, origin, run)
     fields = sampled_fields(followed)
-    bare = MeshSequence(run.positions, run.faces, capture.fps, {}, capture.name, origin, fields=fields, metadata=metadata)
-    return with_looks(bare, followed)
+    lost = _losses(frames)
+    lost += dict.fromkeys(name for shot in frames.shots for name in shot.fields if name not in fields)
+    not_carried = dict.fromkeys([*lost, *(name for shot in frames.shots for name in shot.not_carried)])
+    notes = dict.fromkeys(note for shot in frames.shots for note in shot.notes)
+    bare = MeshSequence(
+        run.positions,
+        run.faces,
+        frames.fps,
+        {},
+        frames.name,
+        origin,
+        fields=fields,
+        metadata=metadata,
+        not_carried=tuple(not_carried),
+        notes=tuple(notes),
+    )
+    return with_looks(bare, followed), lost

@@ -11,17 +11,33 @@ from gvpipe.cli.console import Output, output_options, print_options
 from gvpipe.cli.encode_options import parse_pairs
 from gvpipe.cli.pipes import PIPE
 
-SWEEP_OPTIONS = ("qualities", "pairs", "sted")  # not for --scale
+SWEEP_OPTIONS = ("qualities", "pairs", "sted", "external", "external_decode")  # not for --scale
 SCALE_OPTIONS = ("vertices", "frames", "limit")  # for --scale alone
 
 
 @click.command()
 @click.argument("sources", metavar="SEQUENCES...", nargs=-1)
-@click.option("--codecs", metavar="ID,ID...", help="What to measure, ID or ID:KEY=VALUE. [default: all, mcgv in 2 or 3 ways]")
+@click.option(
+    "--codecs",
+    metavar="ID,ID...",
+    help="What to measure, ID or ID:KEY=VALUE. [default: all, mcgv in 2 or 3 ways; none with --external]",
+)
 @click.option("--qualities", metavar="Q,Q...", help="Qualities to measure. [default: 0,20,40,60,75,90,100]")
 @click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting for all these codecs; repeat for more.")
 @click.option("--kg", default="1,0.3,0.1", show_default=True, metavar="KG,KG...", help="Errors at which to tell rates.")
 @click.option("--sted", metavar="STED,STED...", help="The same for this measure.")
+@click.option("--external", metavar="COMMAND", help="Measure this program, too: 'encode {input} {output}'; frames are given.")
+@click.option("--external-decode", metavar="COMMAND", help="How it decodes: 'decode {input} {output}'; it writes frames.")
+@click.option("--external-format", type=click.Choice(["obj", "ply"]), default="obj", show_default=True, help="Of its frames.")
+@click.option("--external-name", metavar="NAME", default="", help="Its name in tables. [default: the program's]")
+@click.option(
+    "--external-limit",
+    type=click.FloatRange(0, min_open=True),
+    default=3600.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="That each of its commands may take.",
+)
 @click.option("--scale", is_flag=True, help="Measure how time and memory grow with size, on meshes made for it.")
 @click.option("--vertices", metavar="N,N...", help="With --scale. [default: 1000,10000,100000,1000000]")
 @click.option("--frames", metavar="N,N...", help="With --scale. [default: 10,100,1000,10000]")
@@ -43,6 +59,7 @@ def bench(sources: tuple[str, ...], scale: bool, target: str | None, out: Output
     \b
     gvpipe bench a.npz b.npz --json out.json
     gvpipe bench a.npz --codecs mcgv,mcgv:prediction=affine,pca
+    gvpipe bench a.npz --external 'enc {input} {output}' --external-decode 'dec {input} {output}'
     gvpipe bench --scale --limit 600 --json scale.json
     """
     if target not in (None, PIPE) and not target.lower().endswith(".json"):  # a sequence behind --json is not overwritten
@@ -87,6 +104,8 @@ def _check_options(sources: tuple[str, ...], scale: bool, options: dict[str, Any
         raise click.UsageError(f"{name} is {'not for --scale, which has default settings' if scale else 'for --scale alone'}")
     if options["limit"] is not None and not options["limit"] < float("inf"):
         raise click.UsageError(f"--limit {options['limit']}: a number of seconds is needed")
+    if (options["external"] is None) != (options["external_decode"] is None):
+        raise click.UsageError("--external and --external-decode go together: a program is measured by what it decodes")
     if scale and sources:
         raise click.UsageError(f"--scale makes its own sequences; leave {' '.join(sources)} out")
     if not scale and not sources:
@@ -97,13 +116,21 @@ def _run_sweep(sources: tuple[str, ...], options: dict[str, Any], out: Output) -
     from gvpipe.benchmark import sweep
     from gvpipe.benchmark.tables import tables
 
-    codecs = _parse_names(options["codecs"]) or sweep.default_codecs()
+    external = _parse_external(options)
+    codecs = _parse_names(options["codecs"]) or ([] if external else sweep.default_codecs())
     qualities = _parse_numbers("--qualities", options["qualities"]) if options["qualities"] else list(sweep.QUALITIES)
     levels = {"kg": _parse_numbers("--kg", options["kg"])}
     if options["sted"]:
         levels["sted"] = _parse_numbers("--sted", options["sted"])
     with out.progress() as progress:
         made = sweep.run(sources, codecs, qualities, parse_pairs(options["pairs"]), progress)
+        if external:
+            theirs = []
+            for i, source in enumerate(sources):
+                if progress:
+                    progress(f"{sweep.name_of(source)} {external.title}", i / len(sources))
+                theirs.append(external.measure(source, qualities))
+            made = replace(made, curves=[*made.curves, *theirs])
     return made, tables(made.curves, levels)
 
 
@@ -121,6 +148,16 @@ def _run_scale(options: dict[str, Any], out: Output) -> tuple[Any, str]:
 
 def _is_scale(given: object) -> bool:
     return isinstance(given, dict) and "scale" in given
+
+
+def _parse_external(options: dict[str, Any]) -> Any:
+    """The program of ``--external``; None without one."""
+    from gvpipe.benchmark.external import External
+
+    if options["external"] is None:
+        return None
+    form, limit, name = (options[f"external_{key}"] for key in ("format", "limit", "name"))
+    return External(options["external"], options["external_decode"], form, limit, name)
 
 
 def _parse_names(text: str | None) -> list[str]:

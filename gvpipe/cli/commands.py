@@ -36,6 +36,7 @@ from gvpipe.foundation.text import escaped
 if TYPE_CHECKING:
     from gvpipe.encoding.report import Report
     from gvpipe.metrics.frame_metrics import FrameMetric
+    from gvpipe.metrics.texture_errors import TextureErrors
     from gvpipe.model.sequence import MeshSequence
     from gvpipe.web import ExportReport
 
@@ -550,6 +551,16 @@ def compare(
             largest, mean = error["max"], error["mean"]
             measured = "one side lacks it" if largest is None else f"largest error {largest:.4g}, mean {mean:.4g}"
             out.text(f"{kind} {name}: {measured}")
+    for name, ratios in result.textures.items():
+        out.text(f"texture {name}: {_texture_text(ratios)}")
+
+
+def _texture_text(ratios: TextureErrors) -> str:
+    """A texture's mean over frames, and the least of these."""
+    if ratios.rgb_psnr is None:
+        return "one side lacks it, or it cannot be decoded"
+    parts = (("RGB", ratios.rgb_psnr, ratios.rgb_psnr_worst), ("luma", ratios.luma_psnr, ratios.luma_psnr_worst))
+    return ", ".join(f"{name} {mean:.2f} dB (worst {worst:.2f})" for name, mean, worst in parts)
 
 
 def _metric_text(metric: FrameMetric) -> str:

@@ -12,6 +12,7 @@ from gvpipe.foundation.arrays import Int64
 from gvpipe.runtime.compiled import compiled
 
 MOST_CANDIDATES = 48
+N_RANKS = 256
 STEPS_PER_CELL, STEPS_LEAST = 400, 100_000  # looks at open faces that a grid may take
 TYPES, POSES, EXPLICIT, NODES = 0, 5, 13, 14  # first contexts
 N_CONTEXTS = NODES + 4 * 4 * 2 * 16
@@ -44,8 +45,11 @@ class Front(NamedTuple):
         behind: ``(n,)`` the cell to come, of an encoder.
         heads: ``(N,)`` first entry of each point's list of open faces; an entry is 4 times the face and the corner. -1: none.
         nexts: ``(4 n,)`` the entry after each.
-        counts: ``(4,)`` faces made, faces looked at, points known, steps taken.
+        counts: ``(4,)`` faces made, a number that is not used, points known, steps taken.
         keys, cells: ``(2^b,)`` a table of edges, -1 where it is free, and how many cells each has by now.
+        ranks: ``(n,)`` of open faces, -1 of others; all 0 if faces are taken in the order in which they were made.
+        befores, afters: ``(n,)`` open faces of the same rank, -1 at the ends.
+        ends: ``(2, 256)`` first and last open face of each rank, -1 for none.
     """
 
     nodes: Int64
@@ -56,6 +60,10 @@ class Front(NamedTuple):
     counts: Int64
     keys: Int64
     cells: Int64
+    ranks: Int64
+    befores: Int64
+    afters: Int64
+    ends: Int64
 
 
 @compiled
@@ -67,6 +75,7 @@ def code_cells(
     sizes: Int64,
     counts: tuple[int, int, int],
     keeps: bool,
+    is_ranked: bool,
 ) -> tuple[Int64, Int64, Int64, Int64]:
     """Code all cells from the surface inwards.
 
@@ -77,6 +86,7 @@ def code_cells(
         seeds, sizes: ``(P, 4)`` and ``(P,)`` polygons of the surface with a cell behind them, seen from outside.
         counts: V points of the surface, which are known and come first, all N points, M cells.
         keeps: whether cells keep their own numbers of nodes; else any that mean the same cell.
+        is_ranked: whether the open face at whose edges most cells are is taken first; else the one that was made first.
 
     Returns:
         Kinds ``(M,)``, nodes ``(M, 8)``, source cells ``(M,)`` and source points ``(N,)`` in the order of coding. An encoder
@@ -94,6 +104,10 @@ def code_cells(
         np.zeros(4, np.int64),
         np.full(_table_size(n_cells), -1, np.int64),
         np.zeros(_table_size(n_cells), np.int64),
+        np.full(most, -1, np.int64),
+        np.full(most, -1, np.int64),
+        np.full(most, -1, np.int64),
+        np.full((2, N_RANKS), -1, np.int64),
     )
     front.counts[2] = n_surface
     kinds, nodes, cells = np.zeros(n_cells, np.int64), np.zeros((n_cells, 8), np.int64), np.full(n_cells, -1, np.int64)
@@ -162,6 +176,8 @@ def code_cells(
                 if coder.encodes:
                     beyond = _beyond(source, poses, cell, kind, names, nodes[done], j, n)
                 _meet(front, nodes[done], poses.faces[kind, j], n, is_mirrored, beyond)
+        if is_ranked:
+            _rank_faces(front, poses, kind, nodes[done])
     return kinds, nodes, cells, points
 
 
@@ -180,13 +196,57 @@ def _find_pose(face: Int64, nodes: Int64, poses: Int64, n_poses: int, size: int)
 
 @compiled
 def _next_face(front: Front) -> int:
-    """The open face that was made first; -1 for none."""
-    while front.counts[1] < front.counts[0]:
-        f = front.counts[1]
-        front.counts[1] += 1
-        if front.sizes[f]:
-            return int(f)
+    """The open face of the highest rank that has it for the longest; -1 for none."""
+    for rank in range(N_RANKS - 1, -1, -1):
+        if front.ends[0, rank] >= 0:
+            return int(front.ends[0, rank])
     return -1
+
+
+@compiled
+def _list_face(front: Front, f: int, rank: int) -> None:
+    """Put an open face behind the others of a rank."""
+    last = front.ends[1, rank]
+    front.ranks[f], front.befores[f], front.afters[f] = rank, last, -1
+    if last < 0:
+        front.ends[0, rank] = f
+    else:
+        front.afters[last] = f
+    front.ends[1, rank] = f
+
+
+@compiled
+def _unlist_face(front: Front, f: int) -> None:
+    """Take an open face out of the others of its rank."""
+    rank, before, after = front.ranks[f], front.befores[f], front.afters[f]
+    if before < 0:
+        front.ends[0, rank] = after
+    else:
+        front.afters[before] = after
+    if after < 0:
+        front.ends[1, rank] = before
+    else:
+        front.befores[after] = before
+
+
+@compiled
+def _rank_faces(front: Front, poses: Poses, kind: int, nodes: Int64) -> None:
+    """Rank the open faces at the edges of a new cell: by the two edges that have most cells by now."""
+    for i in range(poses.sizes[kind]):
+        here = front.heads[nodes[i]]
+        while here >= 0:
+            front.counts[3] += 1
+            g, here = here >> 2, front.nexts[here]
+            high, second = 0, 0
+            for k in range(front.sizes[g]):
+                count = min(_cells_at(front, front.nodes[g, k], front.nodes[g, (k + 1) % front.sizes[g]]), 15)
+                if count > high:
+                    high, second = count, high
+                elif count > second:
+                    second = count
+            if front.ranks[g] != 16 * high + second:
+                _unlist_face(front, g)
+                _list_face(front, g, 16 * high + second)
 
 
 @compiled
@@ -194,6 +254,7 @@ def _open(front: Front, nodes: Int64, size: int, behind: int) -> None:
     f = front.counts[0]
     front.counts[0] += 1
     front.sizes[f], front.behind[f] = size, behind
+    _list_face(front, f, 0)
     for i in range(size):
         front.nodes[f, i] = nodes[i]
         front.nexts[4 * f + i] = front.heads[nodes[i]]
@@ -212,6 +273,7 @@ def _close(front: Front, f: int) -> None:
             front.heads[at] = front.nexts[entry]
         else:
             front.nexts[before] = front.nexts[entry]
+    _unlist_face(front, f)
     front.sizes[f] = 0
 
 

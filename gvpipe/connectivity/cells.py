@@ -20,7 +20,7 @@ from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import corrupt_section
 from gvpipe.grids.cells import SIZE_OF_TYPE, VOLUMES, Cells
 
-BYTES_PER_NODE, SECONDS_PER_NODE = 60, 0.2e-6  # of decoding
+BYTES_PER_NODE, SECONDS_PER_NODE = 40, 0.2e-6  # of decoding
 IN_ORDER, BY_MASK, BY_PLACE = 0, 1, 2
 
 

@@ -18,7 +18,7 @@ from gvpipe.container.shared_sections import MAX_SHARED, section_hash
 from gvpipe.datasets.recorded import ERRORS, Recorded
 from gvpipe.datasets.sample_names import DESCRIPTION
 from gvpipe.datasets.statistics import KEYS, describe_positions
-from gvpipe.foundation.errors import FormatError, InputError, in_file
+from gvpipe.foundation.errors import FormatError, InputError, SeveralShots, in_file
 from gvpipe.foundation.isolation.plain_files import open_plain
 from gvpipe.foundation.progress import Progress
 
@@ -92,6 +92,10 @@ def look_at(
         try:
             data = read_file(path)
             yield _look(key, path, data, recorded.of(path, len(data)), shared, unlimited)
+        except SeveralShots:
+            left_out[str(path)] = (
+                f"{path} is a capture, and a sample has one connectivity; encode --split makes a file of each shot"
+            )
         except (FormatError, InputError) as exc:
             left_out[str(path)] = str(exc)
 

@@ -65,9 +65,10 @@ def encode_capture(capture: Capture, wanted: CaptureRequest, path: StrPath, cloc
         if is_free and (len(shot) == 1 or is_followed) and isinstance(fitting, Codec):  # nobody knows its vertices
             fitting = dataclasses.replace(fitting, reorder=True)
         targets = tracking.coding_targets(request.targets, is_followed) if tracked.is_any else request.targets
-        if targets == NO_TARGETS and tracked.is_any and "quality" not in request.settings:
-            targets = (tracking.CODED_RMSE, None, None, None)
-        target = shot_target(shot, targets, diagonal)
+        is_default = targets == NO_TARGETS and tracked.is_any and "quality" not in request.settings
+        target = shot_target(shot, (tracking.CODED_RMSE, None, None, None) if is_default else targets, diagonal)
+        if target is not None and is_default and is_followed and diagonal > 0:
+            target = dataclasses.replace(target, largest=tracking.coded_largest(tracked.largest[number]) * diagonal)
         asset = AssetCoder(shot.with_sound(None), wanted.beside)
         coded = code_sequence(shot, fitting, target, asset, True, progress)
         x, y, z = shot.origin.tolist()
@@ -107,7 +108,7 @@ def encode_capture(capture: Capture, wanted: CaptureRequest, path: StrPath, cloc
 def _tracked(capture: Capture, wanted: CaptureRequest, diagonal: float, clock: StageClock) -> tracking.Tracked:
     """The capture as it came, or with its surface followed."""
     if wanted.track is False or (wanted.track is None and not tracking.is_tracked_by_default(capture)):
-        return tracking.Tracked(capture, (None,) * len(capture.shots), ())
+        return tracking.Tracked(capture, (None,) * len(capture.shots), (0.0,) * len(capture.shots), ())
     bound = wanted.request.targets[TARGETS.index("max_error")]
     part = None if bound is None or not diagonal else parse_bound(bound, capture.shots[0]) / diagonal
     return tracking.track(capture, part, wanted.vertices, clock)

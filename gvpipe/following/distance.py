@@ -9,7 +9,7 @@ import numpy as np
 from gvpipe.following.surface import Surface
 from gvpipe.metrics.surface import Scale, measure
 
-LEAST_SAMPLES, MOST_SAMPLES = 10_000, 100_000  # of each surface; between them, one for each triangle of the finer one
+LEAST_SAMPLES, MOST_SAMPLES = 40_000, 100_000  # of each surface; between them, one for each triangle of the finer one
 
 
 class SurfaceError(NamedTuple):

@@ -42,7 +42,7 @@ def follow(
 
     Runs come one by one, in order, and cover each frame once. Only the surface is kept: a run's vertices are not those of any
     frame. At every frame of a run, and in both directions, distances between the run's surface and the frame's are at most
-    ``max_error`` at all vertices of both and at samples: one for each triangle of the finer mesh, at least 10,000 and at most
+    ``max_error`` at all vertices of both and at samples: one for each triangle of the finer mesh, at least 40,000 and at most
     100,000, spread by area. Where a frame cannot be followed, a new run begins. A frame whose own key exceeds the bounds is
     kept as it came, in a run of one frame.
 

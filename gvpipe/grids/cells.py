@@ -98,6 +98,7 @@ SIZES = {
     1: 1, 3: 2, 5: 3, 8: 4, 9: 4, 10: 4, 11: 8, 12: 8, 13: 6, 14: 5, 15: 10, 16: 12, 21: 3, 22: 6, 23: 8, 24: 10, 25: 20,
     26: 15, 27: 13, 28: 9, 29: 27, 30: 6, 31: 12, 32: 18, 33: 24, 34: 7, 35: 4, 37: 19,
 }  # fmt: skip
+SOLID = frozenset((*VOLUMES, POLYHEDRON))
 HIGHER_ORDER = frozenset(range(69, 82)) - {75}  # only their corners are read
 
 
@@ -158,6 +159,16 @@ class Cells:
         polyhedra = None if self.polyhedra is None else self.polyhedra.renumbered(number)
         return Cells(self.types, self.offsets, number[self.nodes], polyhedra)
 
+    def rising(self) -> Cells:
+        """The same with the points of polyhedra in rising order, as VTK lists them."""
+        if self.polyhedra is None:
+            return self
+        owners = np.repeat(np.arange(len(self.types)), self.sizes)
+        own = np.flatnonzero(np.repeat(self.types == POLYHEDRON, self.sizes))
+        nodes = self.nodes.copy()
+        nodes[own] = nodes[own[np.lexsort((nodes[own], owners[own]))]]
+        return Cells(self.types, self.offsets, nodes, self.polyhedra)
+
     def equals(self, other: Cells) -> bool:
         """Whether both are the same cells in the same order."""
         return self is other or (
@@ -178,6 +189,27 @@ def equal_cells(kind: int, nodes: Array) -> Cells:
     """Cells of one type: ``nodes (M, n)`` are their points."""
     count, size = nodes.shape
     return Cells(np.full(count, kind, np.uint8), size * np.arange(count + 1), np.ascontiguousarray(nodes, np.int64).reshape(-1))
+
+
+def listed_cells(types: UInt8, polyhedra: Polyhedra, nodes: Int64 | None = None, sizes: Int64 | None = None) -> Cells:
+    """Cells whose polyhedra have the points of their faces, as they first occur.
+
+    Args:
+        types: ``(M,)``.
+        polyhedra: those among them.
+        nodes: of the others, cell after cell; None: zeros.
+        sizes: ``(M,)`` numbers of nodes, of the others; None: those of their types.
+    """
+    is_free = types == POLYHEDRON
+    sizes = (SIZE_OF_TYPE[types] if sizes is None else sizes).copy()
+    sizes[is_free], own = polyhedra.points()
+    ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    made = np.zeros(int(ends[-1]), np.int64)
+    of_free = np.repeat(is_free, sizes)
+    made[of_free] = own
+    if nodes is not None:
+        made[~of_free] = nodes
+    return Cells(types, ends, made, polyhedra if is_free.any() else None)
 
 
 def join_cells(pieces: list[Cells], starts: list[int]) -> Cells:

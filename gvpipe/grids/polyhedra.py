@@ -49,10 +49,26 @@ class Polyhedra:
         return Polyhedra(self.counts, self.sizes, number[self.nodes])
 
     def points(self) -> tuple[Int64, Int64]:
-        """How many points each polyhedron has ``(n,)``, and these, each once, rising, polyhedron after polyhedron."""
+        """How many points each polyhedron has ``(n,)``, and these, each once, as they first occur, one after the other."""
         owners = np.repeat(np.repeat(np.arange(len(self.counts)), self.counts), self.sizes)
-        pairs = np.unique(np.stack([owners, self.nodes], axis=1), axis=0)
-        return np.bincount(pairs[:, 0], minlength=len(self.counts)), np.ascontiguousarray(pairs[:, 1])
+        _, firsts = np.unique(np.stack([owners, self.nodes], axis=1), axis=0, return_index=True)
+        firsts.sort()
+        return np.bincount(owners[firsts], minlength=len(self.counts)), self.nodes[firsts]
+
+    def edges(self) -> Int64:
+        """``(K, 2)`` pairs of points that follow each other around a face."""
+        ends = np.cumsum(self.sizes)
+        following = np.arange(1, len(self.nodes) + 1)
+        following[ends - 1] = ends - self.sizes
+        return np.stack([self.nodes, self.nodes[following]], axis=1)
+
+    def streams(self) -> tuple[Int64, Int64]:
+        """The mirror of `from_streams`: the streams, one after the other, and ``(n,)`` where each ends."""
+        rows = np.insert(self.nodes, np.cumsum(self.sizes) - self.sizes, self.sizes)  # each face with its number of corners
+        owners = np.repeat(np.arange(len(self.counts)), self.counts)
+        per_cell = np.bincount(owners, self.sizes + 1, len(self.counts)).astype(np.int64)
+        starts = np.cumsum(per_cell) - per_cell
+        return np.insert(rows, starts, self.counts), np.cumsum(per_cell + 1)
 
     def equals(self, other: Polyhedra) -> bool:
         """Whether both are the same."""

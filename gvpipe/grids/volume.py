@@ -12,7 +12,7 @@ import numpy as np
 from gvpipe.asset.field import Field
 from gvpipe.foundation.arrays import Array, Floats, Frames, Int64
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import VOLUMES, Cells
+from gvpipe.grids.cells import POLYHEDRON, SOLID, Cells
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,9 +44,11 @@ class Volume:
             object.__setattr__(self, "points", _Points(self.points))
         if len(self.points.shape) != 3 or self.points.shape[2] != 3:
             raise InputError(f"a volume's points have shape {self.points.shape}; (frames, points, 3) is needed")
-        strange = sorted(set(np.unique(self.cells.types).tolist()) - set(VOLUMES))
+        strange = sorted(set(np.unique(self.cells.types).tolist()) - SOLID)
         if strange:
             raise InputError(f"a volume has cells of type {strange[0]}; volume cells of VTK are needed")
+        if self.cells.polyhedra is None and (self.cells.types == POLYHEDRON).any():
+            raise InputError("a volume has polyhedra without a list of their faces")
         if self.blocks and sum(count for _, count in self.blocks) != len(self.cells.types):
             raise InputError(f"a volume's blocks are not its {len(self.cells.types)} cells")
         for rows, fields in ((self.n_points, self.point_fields), (len(self.cells.types), self.cell_fields)):
@@ -65,7 +67,8 @@ class Volume:
     def check_surface(self, n_frames: int, n_vertices: int, where: str) -> None:
         """Raise `InputError` where it does not fit a surface of V vertices and F frames."""
         n_rows = n_vertices + self.n_points
-        nodes = self.cells.nodes
+        known = self.cells.polyhedra
+        nodes = self.cells.nodes if known is None else np.concatenate([self.cells.nodes, known.nodes])
         if len(nodes) and not 0 <= int(nodes.min()) <= int(nodes.max()) < n_rows:
             raise InputError(f"{where}: a volume's cells have nodes {nodes.min()} to {nodes.max()}; there are {n_rows} points")
         if self.points.shape[0] != n_frames:

@@ -25,7 +25,7 @@ SIMULATIONS: dict[str, SceneReader] = {
     **dict.fromkeys((".pvd", ".series"), late("simulation.step_lists", "read_step_list")),
     **dict.fromkeys((".vtkhdf", ".hdf"), late("simulation.vtkhdf", "read_vtkhdf")),
     **dict.fromkeys((".xdmf", ".xmf"), late("simulation.xdmf", "read_xdmf")),
-    **dict.fromkeys((".e", ".exo", ".ex2"), late("simulation.exodus", "read_exodus")),
+    **dict.fromkeys((".e", ".exo", ".ex2", ".exii"), late("simulation.exodus", "read_exodus")),
     **dict.fromkeys((".case", ".encas"), late("simulation.ensight", "read_ensight")),
     **dict.fromkeys((".foam", ".cgns", ".cas", ".nek5000"), late("simulation.vtk_objects", "read_by_vtk")),
 }

@@ -32,9 +32,9 @@ from gvpipe.metrics.surface_comparison import (
     CaptureSurfaces,
     SequenceSurfaces,
     SurfaceComparison,
-    Surfaces,
     compare_surfaces,
 )
+from gvpipe.metrics.texture_errors import TextureErrors, compare_surface_colours, compare_textures
 from gvpipe.metrics.vertex_errors import BLOCK_BYTES, VertexErrors, frame_diagonal, ratio
 from gvpipe.model.capture import Capture
 from gvpipe.model.sequence import MeshSequence
@@ -55,6 +55,7 @@ class Comparison:
     ``surface`` has the distances of surfaces, where they were asked for or vertices do not correspond. ``unpaired`` says why
     vertices do not, else it is empty. If they do not, ``rmse`` and ``max`` are NaN, other numbers of vertices ``None``,
     ``frames`` is empty, and attributes, fields and volumes are not compared. ``metrics`` has those that were asked for.
+    ``textures`` has the signal-to-noise ratios of pictures by name, or of the surface's colours.
     """
 
     rmse: float
@@ -74,6 +75,7 @@ class Comparison:
     surface: SurfaceComparison | None = None
     unpaired: str = ""
     metrics: dict[str, FrameMetric] = field(default_factory=dict)
+    textures: dict[str, TextureErrors] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """The same values under the same names, ready for `json.dumps`; what is not defined is ``null``."""
@@ -154,7 +156,8 @@ def compare(
     except Unpaired as exc:
         if surface is False or not has_surfaces:
             raise
-        return _compare_unpaired(SequenceSurfaces(reference), SequenceSurfaces(distorted), progress, names, str(exc))
+        one, other = (Capture([each], each.name) for each in (reference, distorted))
+        return _compare_unpaired(one, other, progress, names, str(exc))
     if not surface:
         return _compare_vertices(reference, distorted, pairing, progress, names)
     if not has_surfaces:
@@ -173,7 +176,7 @@ def compare_captures(
     """
     names, changing = check_metrics(metrics), reference if len(reference.shots) > 1 else distorted
     why = f"vertices or triangles of {changing.name} change"
-    return _compare_unpaired(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress, names, why)
+    return _compare_unpaired(reference, distorted, progress, names, why)
 
 
 def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
@@ -182,11 +185,12 @@ def _half(progress: FramesDone | None, half: int) -> FramesDone | None:
 
 
 def _compare_unpaired(
-    reference: Surfaces, distorted: Surfaces, progress: FramesDone | None, names: tuple[str, ...], why: str
+    reference: Capture, distorted: Capture, progress: FramesDone | None, names: tuple[str, ...], why: str
 ) -> Comparison:
-    surface = compare_surfaces(reference, distorted, progress)
-    metrics = unpaired_metrics(names, reference, distorted, surface)
-    return replace(NOTHING, surface=surface, unpaired=why, metrics=metrics)
+    surface = compare_surfaces(CaptureSurfaces(reference), CaptureSurfaces(distorted), progress)
+    metrics = unpaired_metrics(names, CaptureSurfaces(reference), CaptureSurfaces(distorted), surface)
+    textures = compare_surface_colours(reference, distorted)
+    return replace(NOTHING, surface=surface, unpaired=why, metrics=metrics, textures=textures)
 
 
 def _compare_vertices(
@@ -221,6 +225,7 @@ def _compare_vertices(
     found = errors.result(diagonal)
     spatial, temporal = sted.spatial(), sted.temporal()
     same = np.arange(reference.n_vertices) if pairing is None else pairing
+    attributes = compare_attributes(reference, given, same)
     return Comparison(
         **asdict(found),
         da=ratio(100 * errors.mean.mean(), diagonal),
@@ -229,9 +234,10 @@ def _compare_vertices(
         sted_temporal=temporal,
         hausdorff=hausdorff.result(),
         frames=[{"rmse": float(r), "max": float(m)} for r, m in zip(errors.rmse, errors.largest, strict=True)],
-        attributes=compare_attributes(reference, given, same),
+        attributes=attributes,
         fields=compare_fields(reference, given, same),
         volume=compare_volumes(reference, given),
         surface=surface,
         metrics=more.result(errors.rmse, diagonal, surface),
+        textures=compare_textures(reference, given, attributes),
     )

@@ -48,6 +48,9 @@ def comparison_html(numbers: Mapping[str, Any]) -> str:
     for kind in ("attributes", "fields", "volume"):
         for name, errors in numbers[kind].items():
             rows.append((f"{name}: largest error", f"{errors['max']:.4g}" if errors.get("max") is not None else "none"))
+    for name, ratios in numbers["textures"].items():
+        if ratios["rgb_psnr"] is not None:
+            rows.append((f"colours of {name}: signal-to-noise ratio, dB", f"{ratios['rgb_psnr']:.4g}"))
     cell = '<td style="text-align: left">{}</td>'
     table = "".join(f"<tr>{cell.format(html.escape(words))}{cell.format(value)}</tr>" for words, value in rows)
     frames = numbers["frames"]

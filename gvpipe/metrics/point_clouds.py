@@ -67,7 +67,7 @@ def cloud_errors(source: Cloud, target: Cloud, tree: TriangleTree) -> tuple[floa
     """D1 and D2 of one way, squared model units; NaN where a cloud has no point. ``tree`` is that of ``target.corners``."""
     if not len(source.points) or not len(target.points):
         return math.nan, math.nan
-    points = source.points[:: -(-len(source.points) // QUERIES)]
+    points = measured_points(source)[0]
     cloud = cKDTree(target.points, balanced_tree=False)  # a balanced one takes half as long again
     nearest = np.asarray(cloud.query(points, distance_upper_bound=FAR * target.step)[1], np.intp)
     near = nearest < len(target.points)  # others have none within the bound
@@ -77,6 +77,12 @@ def cloud_errors(source: Cloud, target: Cloud, tree: TriangleTree) -> tuple[floa
     along_far = _along(points[~near] - target.corners[found.triangles, 0], target.normals[found.triangles])
     d1 = float(np.einsum("pc,pc->", apart, apart)) + float(np.square(found.distances).sum())
     return d1 / len(points), (float(np.square(along).sum()) + float(np.square(along_far).sum())) / len(points)
+
+
+def measured_points(cloud: Cloud) -> tuple[Float64, Int64]:
+    """Every k-th point of a cloud, so that there are at most `QUERIES`, and the triangle of each: ``(P, 3)`` and ``(P,)``."""
+    chosen = slice(None, None, max(1, -(-len(cloud.points) // QUERIES)))
+    return cloud.points[chosen], cloud.triangles[chosen]
 
 
 def _along(vectors: Float64, normals: Float64) -> Float64:

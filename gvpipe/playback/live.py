@@ -132,7 +132,8 @@ class LiveEncoder:
         wanted = (self._first.n_vertices, 3)
         if positions.shape != wanted:
             raise InputError(
-                f"frame {self.n_frames} has shape {positions.shape}, frame 0 has {wanted}; the mesh must not change"
+                f"frame {self.n_frames} has shape {positions.shape}, frame 0 has {wanted}; the mesh must not change: go on in "
+                "another file, or encode all frames as a capture when they are there"
             )
         if self.n_frames >= self._coder.most_clips * self.clip_frames:
             raise InputError(

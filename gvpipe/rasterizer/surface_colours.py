@@ -4,10 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
+from gvpipe.asset.material import Material
 from gvpipe.foundation.arrays import Float64, Int32, UInt8
 from gvpipe.rasterizer.colours import LEVELS, srgb_codes
 from gvpipe.rasterizer.look import Asset, look_of
 from gvpipe.rasterizer.scene import BASE, Fragments
+
+COLOUR = "color"  # name and kind of the attribute
+
+
+def has_paint(asset: Asset) -> bool:
+    """Whether an asset's colours differ from place to place: by pictures, by vertices or by materials."""
+    used = used_materials(asset)
+    colour = asset.attributes.get(COLOUR)
+    has_colours = colour is not None and colour.kind == COLOUR and colour.domain != "part"
+    return has_colours or any(each.base_color_texture for each in used) or len({each.base_color for each in used}) > 1
+
+
+def used_materials(asset: Asset) -> list[Material]:
+    """The materials that triangles have, each once."""
+    numbers = {part.material for part in asset.parts if part.material is not None and part.triangles[0] < part.triangles[1]}
+    return [asset.materials[number] for number in sorted(numbers)]
 
 
 class SurfaceColours:

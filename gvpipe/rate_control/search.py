@@ -63,7 +63,7 @@ def meet(
             f"quality {trial.codec.quality:.4g} is the smallest of {len(tried)}, {trial.corrections} bytes of it corrections"
         )
         return Choice(trial, trials, tried, reason)
-    trials = Trials(codec, sequence, None, progress, asset, is_bare)
+    trials = Trials(codec, sequence, target.largest, progress, asset, is_bare)
     tolerance = ROUGH_TOLERANCE if is_rough else TOLERANCE
     trial, tried = find_quality(trials, target, _start(target, codec, sequence, tolerance), tolerance)
     found = target.of(trial)

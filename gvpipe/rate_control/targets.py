@@ -26,6 +26,7 @@ class Target:
         measure: ``rmse`` (parts of frame 0's diagonal) or ``kg`` (percent) of the decoded frames; ``bpvf`` of the file;
             ``max``, a bound that every vertex of every frame keeps, model units.
         value: above 0.
+        largest: what every vertex of every frame keeps besides, model units; None: nothing.
 
     Raises:
         SettingError: a value that is not a positive number.
@@ -33,6 +34,7 @@ class Target:
 
     measure: str
     value: float
+    largest: float | None = None
 
     def __post_init__(self) -> None:
         if self.measure not in NAMES:

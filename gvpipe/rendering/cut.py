@@ -15,7 +15,8 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array, Bool, Float64, Int32, Int64
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import VOLUMES, Cells
+from gvpipe.grids.cells import POLYHEDRON, VOLUMES, Cells
+from gvpipe.grids.polyhedra import Polyhedra, ranges
 
 FORM = re.compile(r"(-?)([xyz])=([-+0-9.eE]+)(%?)")
 MEANT = re.compile(r"-?[a-z]=.*")
@@ -153,7 +154,29 @@ def _crossing(cells: Cells, height: Float64) -> tuple[Int64, Int64]:
             for i in range(1, len(face) - 1):
                 made.append(nodes[:, [used[0], face[0], face[i], face[i + 1]]])
                 owners.append(at)
+    if cells.polyhedra is not None:
+        fans, of_fan = _crossing_polyhedra(cells, cells.polyhedra, height)
+        made.append(fans)
+        owners.append(of_fan)
     return np.concatenate(made), np.concatenate(owners)
+
+
+def _crossing_polyhedra(cells: Cells, known: Polyhedra, height: Float64) -> tuple[Int64, Int64]:
+    """As `_crossing`, of polyhedra: fans of faces around the first corner of the first face."""
+    at = np.flatnonzero(cells.types == POLYHEDRON)
+    sizes = np.repeat(cells.types == POLYHEDRON, cells.sizes)
+    owner = np.repeat(np.arange(len(at)), cells.sizes[at])
+    low = np.bincount(owner, height[cells.nodes[sizes]] <= 0, len(at))
+    some = np.flatnonzero((low > 0) & (low < cells.sizes[at]))
+    own = known.select(some)
+    of_face = np.repeat(np.arange(len(some)), own.counts)
+    starts = np.cumsum(own.sizes) - own.sizes
+    apexes = own.nodes[starts[np.cumsum(own.counts) - own.counts]][of_face]
+    n_fans = own.sizes - 2
+    first, second = np.repeat(starts, n_fans), ranges(starts + 1, n_fans)
+    fans = np.stack([np.repeat(apexes, n_fans), own.nodes[first], own.nodes[second], own.nodes[second + 1]], axis=1)
+    is_solid = (fans[:, 1:] != fans[:, :1]).all(axis=1)
+    return fans[is_solid], at[some][np.repeat(of_face, n_fans)][is_solid]
 
 
 def _piece(corners: Int64, sources: Int64, height: Float64) -> Piece:

@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 from sequences import awkward, same_triangles, waving
+from shapes import ball
 
 from gvbaselines.baseline import Baseline
+from gvbaselines.square_map import map_to_square
+from gvbaselines.wavelets import decode_levels, encode_levels, restore, transform
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.container.bitstream import pack_payload, unpack_payload
-from gvpipe.foundation.errors import FormatError, SettingError
+from gvpipe.container.cursor import Cursor
+from gvpipe.foundation.errors import FormatError, InputError, SettingError
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
 
@@ -26,16 +30,20 @@ ENTRIES = tomllib.loads(PROJECT.read_text("utf-8"))["project"]["entry-points"]["
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     *((name, {}) for name in ENTRIES),
     *(("dynapack", {"predictor": predictor}) for predictor in ("replica", "space", "time")),
+    ("gv", {"prediction": "none"}),
     ("kglpc", {"taps": 0}),
+    ("maverg", {"predictor": "motion"}),
     ("cpca", {"clusters": 3, "components": 0}),
 ]
+SLOW = pytest.mark.slow
 each_variant = pytest.mark.parametrize(
-    ("name", "settings"), [pytest.param(n, s, id=" ".join([n, *map(str, s.values())])) for n, s in VARIANTS]
+    ("name", "settings"),
+    [pytest.param(n, s, id=" ".join([n, *map(str, s.values())]), marks=SLOW if n == "gv" else []) for n, s in VARIANTS],
 )
 AWKWARD = awkward()
 AWKWARD_CASES = [  # each codec meets every third input; the others are left to the slow run
-    pytest.param(codec, name, id=f"{codec}-{name}", marks=[] if (i + j) % 3 == 0 else pytest.mark.slow)
-    for i, codec in enumerate(ENTRIES)
+    pytest.param(codec, name, id=f"{codec}-{name}", marks=[] if (i + j) % 3 == 0 else SLOW)
+    for i, codec in enumerate(name for name in ENTRIES if name != "gv")  # it takes one surface
     for j, name in enumerate(AWKWARD)
 ]
 
@@ -100,7 +108,7 @@ def test_segments_decode_alone_and_order_is_kept(name: str) -> None:
     assert np.array_equal(alone.read(6, 9), whole[6:9])
 
 
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW if name == "gv" else []) for name in ENTRIES])
 def test_changed_and_cut_bytes_are_refused_or_decode(name: str) -> None:
     """No change of a section's bytes leads to anything but frames or `FormatError`."""
     _, made = encoded(name)
@@ -124,3 +132,30 @@ def test_awkward_inputs(codec: str, name: str) -> None:
     given = np.asarray(sequence.positions[:], np.float64)
     extent = float(np.ptp(given, axis=(0, 1)).max())
     assert np.abs(frames - given).max() <= 0.02 * extent + 1e-6 * np.abs(given).max()
+
+
+@pytest.mark.parametrize("name", ["soup", "two parts"])
+def test_geometry_video_refuses_what_is_not_one_surface(name: str) -> None:
+    sheet = waving(4, 3)
+    faces = sheet.faces if name == "two parts" else sheet.faces[:1]
+    twice = np.concatenate([faces, faces + sheet.n_vertices])
+    positions = np.concatenate([sheet.positions[:], sheet.positions[:] + np.float32(9)], axis=1)
+    with pytest.raises(InputError, match="gv codes one connected manifold surface"):
+        load("gv")().encode(MeshSequence(positions, twice))
+
+
+def test_a_cut_surface_covers_the_square() -> None:
+    """A sphere without poles: no triangle of the map is turned over, their areas make up the square."""
+    points, triangles = ball(9, 14)
+    found = map_to_square(points.astype(np.float64), triangles.astype(np.int64))
+    first, second = (found.places[found.disk.triangles[:, k]] - found.places[found.disk.triangles[:, 0]] for k in (1, 2))
+    areas = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+    assert areas.min() > -1e-9
+    assert areas.sum() == pytest.approx(1)
+
+
+def test_wavelets_and_their_coding_give_back_images() -> None:
+    images = np.random.default_rng(3).normal(0, 9, (2, 32, 32, 3))
+    assert np.allclose(restore(transform(images[0])), images[0])
+    values = np.rint(images).astype(np.int32)
+    assert np.array_equal(decode_levels(Cursor(encode_levels(values), "levels"), values.shape), values)

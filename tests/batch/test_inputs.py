@@ -54,6 +54,23 @@ def test_frames_of_a_folder_are_one_sequence_whatever_its_name() -> None:
     ]
 
 
+def test_files_that_a_list_of_steps_names_are_its_own(tmp_path: Path) -> None:
+    (tmp_path / "runs" / "crash").mkdir(parents=True)
+    entries = ""
+    for k in range(3):
+        (tmp_path / "runs" / "crash" / f"{k}.vtp").touch()
+        entries += f'<DataSet timestep="{k}" file="crash/{k}.vtp"/>' if k < 2 else ""
+    text = f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>'
+    (tmp_path / "runs" / "crash.pvd").write_text(text)
+    with pytest.raises(InputError, match="would both become"):  # a third file that the list does not name
+        find_jobs(["runs"], "out")
+    (tmp_path / "runs" / "crash" / "2.vtp").unlink()
+    assert [job.source for job in find_jobs(["runs"], "out").jobs] == ["runs/crash.pvd"]
+    (tmp_path / "runs" / "crash.pvd").write_text("damaged")
+    with pytest.raises(InputError, match="would both become"):
+        find_jobs(["runs"], "out")
+
+
 def test_what_is_no_mesh_is_left_out() -> None:
     assert find_jobs(["captures"], "captures/out").left_out == ["captures/b/frames/f.mtl"]
     with pytest.raises(InputError, match="no sequence among 1 files, such as captures/b/frames/f.mtl"):

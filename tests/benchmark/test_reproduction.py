@@ -26,6 +26,7 @@ from gvpipe.benchmark.reproduction.claims import (
     less_rate,
     rate,
 )
+from gvpipe.benchmark.reproduction.hypothetical import hypothetical_points
 from gvpipe.benchmark.reproduction.lab import QUICK_QUALITIES, Lab
 from gvpipe.benchmark.reproduction.reproduce import PAPERS, claims_of, reproduce
 from gvpipe.benchmark.sweep import report_of
@@ -78,7 +79,7 @@ def test_claims_are_judged(lab: Lab) -> None:
 
     assert [state(21, AT_MOST), state(19, AT_MOST), state(21, AT_LEAST)] == [HOLDS, FAILS, FAILS]
     assert [state(18, "about"), state(17, "about")] == [HOLDS, FAILS]
-    for name, codec, why in (("dance", "pca", "dance.npz"), ("cow", "famc", "famc is not installed")):
+    for name, codec, why in (("dance", "pca", "dance.npz"), ("cow", "cobra", "cobra is not installed")):
         outcome = judge(Claim("x", "Table 1", "", 1, "", measure=rate(name, codec, "kg", 0.1)), lab)
         assert (outcome.state, outcome.ours) == (NOT_RUN, None) and why in outcome.why
     left_out = Lab(lab.data, QUICK_QUALITIES, lab.curves, skipped=["cow"])
@@ -115,3 +116,14 @@ def test_wrong_arguments(run: Run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there are mcgv, pca"):
         reproduce(["famc"], tmp_path)
     assert run("reproduce", "pca", "--data", tmp_path / "none").status == 1
+
+
+def test_the_hypothetical_predictor_takes_fewer_bits(tmp_path: Path) -> None:
+    gvpipe.write(waving(10, 12), tmp_path / "sheet.npz")
+    lab = Lab(tmp_path, (40.0, 80.0))
+    for point, known in zip(
+        hypothetical_points(lab.sequence("sheet"), lab), lab.points("sheet", "pca:predictor=navg"), strict=True
+    ):
+        assert point["kg"] == pytest.approx(known["kg"], rel=0.2)
+        coefficients = known["sections"]["coefficients.0"]
+        assert 0 < point["bpvf"] < 8 * (known["bytes"] - 0.1 * coefficients) / (100 * 12)

@@ -302,6 +302,8 @@ def test_a_surface_is_followed(tmp_path: Path) -> None:
     report = gvpipe.encode(capture, tmp_path / "a.mp4")
     assert len(report.shots) == 1 and report.shots[0]["key"] in range(4)
     assert any("4 frames follow 1 key mesh: rms" in note for note in report.notes)
+    left = gvpipe.compare(capture, tmp_path / "a.mp4").surface
+    assert left is not None and left.max_diag is not None and left.max_diag <= 0.01
     found = gvpipe.open_capture(tmp_path / "a.mp4").capture()
     for frame in range(4):
         reach = np.abs(found.frame(frame)[0]).max(axis=1)
@@ -332,4 +334,4 @@ def test_among_many(run: Run, tmp_path: Path) -> None:
     ended = run("encode-all", tmp_path / "many", tmp_path / "out", "--json")
     assert ended.status == 0 and json.loads(ended.out)["encoded"] == 1
     ended = run("pack", tmp_path / "out", tmp_path / "s-%05d.tar")
-    assert ended.status == 1 and "a capture of 3 shots" in ended.err
+    assert ended.status == 1 and "encode --split makes a file of each shot" in ended.err

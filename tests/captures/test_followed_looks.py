@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -144,17 +145,36 @@ def test_fields_are_sampled_where_that_is_asked_for() -> None:
         np.testing.assert_array_equal(shot.fields["half"][number][inside], (middle > 0)[inside])
 
 
+BUMPY = gvpipe.Material("skin", base_color_texture=gvpipe.Texture(0), normal_texture=gvpipe.Texture(0), alpha_mode="mask")
+
+
+def test_what_following_loses_of_any_frame_is_named(tmp_path: Path) -> None:
+    frames = [replace(frame(number, "textures"), not_carried=("a lamp",)) for number in range(3)]
+    frames[1] = frames[1].with_looks((BUMPY,), frames[1].images, frames[1].parts)
+    frames[2] = replace(frames[2], fields={"heat": np.zeros((1, frames[2].n_vertices), np.float32)}, notes=("seen",))
+    given = gvpipe.Capture(frames, "box")
+    assert not tracking.is_tracked_by_default(given)
+    report = gvpipe.encode(given, tmp_path / "a.mp4", track=True)
+    assert len(report.shots) == 1 and report.not_carried == ["normal texture", "alpha", "heat", "a lamp"]
+    assert "only the surface is followed; left out: normal texture, alpha, heat" in report.notes and "seen" in report.notes
+    assert gvpipe.info(tmp_path / "a.mp4").not_carried == report.not_carried
+
+
 def test_what_following_loses_keeps_it_from_being_the_default() -> None:
     shot = frame(0, "textures")
     material = shot.materials[0]
     assert tracking.what_is_lost(shot) == []
-    bumpy = shot.with_looks(
-        (gvpipe.Material("skin", base_color_texture=gvpipe.Texture(0), normal_texture=gvpipe.Texture(0), alpha_mode="mask"),),
-        shot.images,
-        shot.parts,
-    )
+    bumpy = shot.with_looks((BUMPY,), shot.images, shot.parts)
     assert tracking.what_is_lost(bumpy) == ["normal texture", "alpha"]
+    half = len(shot.faces) // 2
+    halves = [gvpipe.Part("box", (0, shot.n_vertices), rows, k) for k, rows in enumerate(((0, half), (half, 2 * half)))]
+    shiny = shot.with_looks((material, replace(material, metallic=1.0)), shot.images, tuple(halves))
+    assert tracking.what_is_lost(shiny) == ["materials but the first"]
+    assert tracking.what_is_lost(shiny.with_looks((material, replace(material, name="b")), shot.images, tuple(halves))) == []
     assert material.base_color_texture is not None
+    blank = shot.with_looks((replace(material, base_color_texture=None),), (), shot.parts)
+    assert tracking.what_is_lost(blank) == ["uv"]  # but not beside frames that have a picture
+    assert tracking.is_tracked_by_default(gvpipe.Capture([shot, blank, frame(1, "textures")]))
     film = gvpipe.Image("film", "image/x-exr", b"\x76\x2f\x31\x01")  # nothing here decodes it
     assert tracking.what_is_lost(shot.with_looks(shot.materials, (film,), shot.parts)) == ["pictures that cannot be decoded"]
     with_more = MeshSequence(shot.positions, shot.faces, 25.0, {"weight": np.zeros(shot.n_vertices, np.float32)})

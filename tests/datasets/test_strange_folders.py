@@ -8,6 +8,7 @@ import sys
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import gvpipe
@@ -45,6 +46,14 @@ def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
     left, names = packed(folder, tmp_path / "out.tar")
     assert set(left) == {"a.mp4", "c.mp4"} and "a.json is a link" in left["a.mp4"] and "is a link" in left["c.mp4"]
     assert names == ["b.mp4", "b.json"]
+
+
+def test_captures_are_named_and_their_shots_can_be_packed(sequence: MeshSequence, folder: Path, tmp_path: Path) -> None:
+    shots = [sequence.part(0, 2), gvpipe.MeshSequence(np.eye(3)[None], np.array([[0, 1, 2]], np.int32), sequence.fps)]
+    gvpipe.encode(gvpipe.Capture(shots), folder / "c.mp4", track=False)
+    left, names = packed(folder, tmp_path / "out.tar")
+    assert set(left) == {"c.mp4"} and "encode --split makes a file of each shot" in left["c.mp4"]
+    assert names == ["a.mp4", "a.json", "b.mp4", "b.json"]
 
 
 def test_a_pipe_beside_a_video(folder: Path, tmp_path: Path) -> None:

@@ -108,7 +108,7 @@ def test_quotients_without_a_meaning_are_null_and_json_stays_valid() -> None:
     point = MeshSequence(np.zeros((3, 4, 3), np.float32), TETRAHEDRON)
     result = compare(point, _moved(point, np.ones((3, 4, 3))))
     shape = json.loads(json.dumps(result.to_json(), allow_nan=False))
-    assert list(shape) == [*VALUES, "frames", "attributes", "fields", "volume", "surface", "unpaired", "metrics"]
+    assert list(shape) == [*VALUES, "frames", "attributes", "fields", "volume", "surface", "unpaired", "metrics", "textures"]
     assert [name for name in VALUES if shape[name] is None] == ["rmse_diag", "max_diag", "kg", "da", *VALUES[6:9]]
     assert result.hausdorff == pytest.approx(np.sqrt(3))
     equal = compare(point, point)

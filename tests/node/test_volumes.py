@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cell_grids import quadratic, sequence_of, voronoi
 from folders import ROOT
 from pages import BUNDLE
 
 import gvpipe
 from gvpipe.asset_coding import volume_encoder
-from gvpipe.asset_coding.volume_list import BY_WALK, IN_ORDER
+from gvpipe.asset_coding.volume_list import BY_CORNERS, BY_WALK, IN_ORDER
 from gvpipe.asset_coding.volume_rows import VolumeRows
 from gvpipe.container.mp4 import read_file, write_file
 from gvpipe.grids.cells import equal_cells
@@ -93,6 +94,33 @@ def test_walks_are_pythons(kind: str, shuffled: bool, reorder: bool, tmp_path: P
 def force_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let cells in order be large."""
     monkeypatch.setattr(volume_encoder, "encode_cells", lambda cells: bytes(1 << 20))
+
+
+@pytest.mark.parametrize(
+    ("kind", "reorder"), [(24, False), *(pytest.param(kind, True, marks=pytest.mark.slow) for kind in (25, 26, 29))]
+)
+def test_quadratic_cells_are_pythons(kind: int, reorder: bool, tmp_path: Path) -> None:
+    gvpipe.encode(sequence_of(*quadratic(kind)), tmp_path / "a.mp4", "pca", reorder=reorder)
+    assert check(tmp_path / "a.mp4", tmp_path) == BY_CORNERS
+
+
+def test_polyhedra_are_left_out_with_a_note(tmp_path: Path) -> None:
+    gvpipe.encode(sequence_of(*voronoi(12)), tmp_path / "a.mp4", "pca")
+    script = f"""
+        const {{ process }} = globalThis;
+        delete globalThis.process;
+        globalThis.window = globalThis;
+        globalThis.location = new URL("http://localhost/");
+        const {{ GeometryVideo }} = await import({json.dumps((BUNDLE / "geometry-video.js").as_uri())});
+        const {{ readFileSync }} = await import("node:fs");
+        const video = await GeometryVideo.load(new Uint8Array(readFileSync({json.dumps(str(tmp_path / "a.mp4"))})));
+        console.log(JSON.stringify([video.volume, video.notes, video.frameCount]));
+        process.exit(0);
+    """
+    done = subprocess.run(["node", "--input-type=module", "-e", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    volume, notes, n_frames = json.loads(done.stdout)
+    assert volume is None and n_frames == 3 and "polyhedra, which gvpipe's Python alone decodes" in " ".join(notes)
 
 
 @pytest.mark.slow

@@ -145,7 +145,11 @@ def test_holes_are_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("positions", "fields", "message"),
     [
-        (FRAMES[0][:5], {"size": 0}, r"frame 1 has shape (5, 3), frame 0 has (64, 3); the mesh must not change"),
+        (
+            FRAMES[0][:5],
+            {"size": 0},
+            r"frame 1 has shape (5, 3), frame 0 has (64, 3); the mesh must not change: go on in another file",
+        ),
         (FRAMES[0] + np.nan, {"size": 0}, "vertex 0 is [nan, nan, nan]"),
         (FRAMES[0], {}, "frame 1 has no fields; frame 0 has size, and all must have the same"),
         (FRAMES[0], {"size": 0, "other": 0}, "frame 1 has other, size; frame 0 has size"),

@@ -16,6 +16,7 @@ from gvpipe.mesh.topology import adjacency, components
 
 MCGV, JPEG = "mcgv:prediction=affine", "mcgv:prediction=affine:image=jpeg"
 RMSE = "rmse"
+GV = "all 204 frames; errors at vertices, resampling's among them"
 
 
 def claims() -> list[Claim]:
@@ -36,7 +37,6 @@ def _table_1() -> list[Claim]:
 
 
 def _figures() -> list[Claim]:
-    remesh = "geometry video resamples the mesh; there is no baseline of it"
     return [
         Claim(
             "mcgv-f3",
@@ -113,18 +113,37 @@ def _figures() -> list[Claim]:
                 ("rt", "RT"),
             )
         ),
+        Claim(
+            "mcgv-f9-cow",
+            "Figure 9",
+            "50 % less distortion than GV at 8 bpvf, frames alone, on cow",
+            50,
+            "% of error",
+            AT_LEAST,
+            less_error("cow", JPEG, "gv:prediction=none", RMSE, 8.0),
+            GV,
+        ),
         *(
             Claim(
                 f"mcgv-f9-{name}",
                 "Figure 9",
-                f"{number} % less distortion than GV at 8 bpvf, JPEG, on {name}",
+                f"{number} % less distortion than GV at 8 bpvf, frames alone, on {name}",
                 number,
                 "% of error",
-                note=remesh,
+                note="the sequence is not at hand",
             )
-            for name, number in (("cow", 50), ("dance", 60), ("snake", 10))
+            for name, number in (("dance", 60), ("snake", 10))
         ),
-        Claim("mcgv-f9-p", "Figure 9", "12 % fewer bits than GV with prediction, on dance", 12, "% of rate", note=remesh),
+        Claim(
+            "mcgv-f9-p",
+            "Figure 9",
+            "12 % fewer bits than GV with prediction, on dance",
+            12,
+            "% of rate",
+            AT_LEAST,
+            less_rate_overall("cow", MCGV, "gv", RMSE),
+            f"on cow in place of dance; {GV}; averaged over the curve",
+        ),
         Claim(
             "mcgv-f10-rt",
             "Figure 10",

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,6 +78,26 @@ def run_python(
             process.kill()
             raise
     return Ended(process.returncode, out, err.decode(errors="replace"))
+
+
+def run_program(words: Sequence[str], folder: str | os.PathLike[str], limit: float) -> Ended:
+    """Run a program that the user names, to its end, in a folder; what it prints comes back as ``err``.
+
+    Output goes through a file, so that children that outlive the program keep nobody waiting.
+
+    Raises:
+        TimeoutExpired: it took more than ``limit`` seconds, and was ended.
+        OSError: it cannot be started.
+    """
+    with tempfile.TemporaryFile() as printed:
+        with Process(list(words), stdin=DEVNULL, stdout=printed, stderr=subprocess.STDOUT, cwd=folder) as process:
+            try:
+                process.wait(limit)
+            except BaseException:
+                process.kill()
+                raise
+        printed.seek(0)
+        return Ended(process.returncode, b"", printed.read().decode(errors="replace"))
 
 
 def module_path() -> list[str]:

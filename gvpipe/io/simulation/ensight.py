@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
-from gvpipe.grids.cells import POLYHEDRON, Cells, equal_cells, join_cells, structured_cells
+from gvpipe.grids.cells import POLYHEDRON, Cells, equal_cells, join_cells, listed_cells, structured_cells
 from gvpipe.grids.polyhedra import Polyhedra
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
@@ -232,9 +232,7 @@ def _read_elements(file: EnsightFile, kind: str, has_ids: bool) -> Cells:
         counts = file.integers(count).astype(np.int64)
         sizes = file.integers(int(counts.sum())).astype(np.int64)
         polyhedra = Polyhedra(counts, sizes, file.ragged(int(sizes.sum()), len(sizes)).astype(np.int64) - 1)
-        corners, nodes = polyhedra.points()
-        ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(corners)])
-        return Cells(np.full(count, POLYHEDRON, np.uint8), ends, nodes, polyhedra)
+        return listed_cells(np.full(count, POLYHEDRON, np.uint8), polyhedra)
     if plain not in ELEMENTS:
         raise ValueError(f"{file.name} has elements {kind[:20]!r}, which are not read")
     vtk, size = ELEMENTS[plain]

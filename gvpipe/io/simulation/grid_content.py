@@ -98,7 +98,7 @@ def grid_sequence(sequence: MeshSequence, volume: Volume) -> tuple[MeshSequence,
         else:
             kind = "vector" if one.kind in ("normal", "tangent") else one.kind
             fields[name] = Field(_AllRows(*parts, rows, n_frames), "vertex", kind, one.unit)
-    cells = Cells(volume.cells.types, volume.cells.offsets, order[volume.cells.nodes])
+    cells = volume.cells.renumbered(order).rising()
     inside_only = Volume(cells, np.zeros((n_frames, 0, 3), np.float32), cell_fields=volume.cell_fields, blocks=volume.blocks)
     made = replace(
         sequence.bare(),

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Floats, Int64, UInt8
-from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells, structured_cells
+from gvpipe.grids.cells import POLYHEDRON, Cells, join_cells, listed_cells, structured_cells
 from gvpipe.grids.polyhedra import from_streams
 from gvpipe.io.left_behind import LeftBehind
 from gvpipe.io.simulation.dataset import DataArray, Dataset, field_data, text_array
@@ -213,15 +213,7 @@ def _with_polyhedra(types: UInt8, offsets: Int64, nodes: Int64) -> Cells:
         return Cells(types, offsets, nodes)  # which says what is wrong
     is_polyhedron = types == POLYHEDRON
     polyhedra = from_streams(nodes, offsets[:-1][is_polyhedron], offsets[1:][is_polyhedron])
-    counts, points = polyhedra.points()
-    sizes = np.diff(offsets)
-    sizes[is_polyhedron] = counts
-    ends = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
-    made = np.empty(ends[-1], np.int64)
-    own = np.repeat(is_polyhedron, sizes)
-    made[own] = points
-    made[~own] = nodes[np.repeat(~is_polyhedron, np.diff(offsets))]
-    return Cells(types, ends, made, polyhedra)
+    return listed_cells(types, polyhedra, nodes[np.repeat(~is_polyhedron, np.diff(offsets))], np.diff(offsets))
 
 
 def _read_cells(cursor: _Cursor, word: str) -> tuple[Int64, Int64]:

@@ -149,6 +149,12 @@ class _PartSteps:
         return join_blocks(found)
 
 
+def listed_files(path: Path) -> list[Path]:
+    """The files that a list names, in its order; raises `InputError` as `read_step_list` does."""
+    with reading(path, "a list of steps"):
+        return _files(path, _read_list(path)[0])
+
+
 def _files(path: Path, listed: list[Listed]) -> list[Path]:
     return [side_file(path, name, "step", later=True) for _, name, _ in listed]
 

@@ -22,6 +22,7 @@ from gvpipe.grids.cells import (
     POLYGON,
     POLYHEDRON,
     SIZE_OF_TYPE,
+    SOLID,
     STRIP,
     VOLUMES,
     Cells,
@@ -31,7 +32,6 @@ from gvpipe.io.mesh import as_polygons, fan
 from gvpipe.mesh.unique_rows import row_ids
 
 QUADRATIC_POLYGON = 36
-POLYHEDRA = "polyhedra but for their surface"
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +99,9 @@ def extract_surface(cells: Cells, points: Floats) -> Surface:
 
 
 def _check_types(cells: Cells) -> None:
-    known = {*POINTS_AND_LINES, *OUTLINES, *VOLUMES, STRIP, POLYGON, QUADRATIC_POLYGON}
-    if cells.polyhedra is not None:
-        known.add(POLYHEDRON)
+    known = {*POINTS_AND_LINES, *OUTLINES, *SOLID, STRIP, POLYGON, QUADRATIC_POLYGON}
+    if cells.polyhedra is None:
+        known.remove(POLYHEDRON)
     strange = sorted(set(np.unique(cells.types).tolist()) - known)
     if strange:
         name = "polyhedra without a list of their faces" if strange[0] == POLYHEDRON else f"of type {strange[0]}"
@@ -115,13 +115,12 @@ def _left_behind(cells: Cells, n_covered: int) -> LeftBehind:
     left.add("points and lines", int(np.isin(cells.types, list(POINTS_AND_LINES)).sum()))
     left.add("flat cells that are faces of volume cells", n_covered)
     left.add("curvature of cells of higher order", int(np.isin(cells.types, list(HIGHER_ORDER)).sum()))
-    left.add(POLYHEDRA, int((cells.types == POLYHEDRON).sum()))
     return left
 
 
 def _add_inside(left: LeftBehind, cells: Cells, used: Int64, n_points: int) -> None:
     """Note what lies inside of the surface."""
-    is_solid = np.isin(cells.types, list(VOLUMES))
+    is_solid = np.isin(cells.types, list(SOLID))
     left.add(VOLUME_CELLS, int(is_solid.sum()))
     is_inner = _is_met(cells.nodes[np.repeat(is_solid, cells.sizes)], n_points)
     is_inner[used] = False

@@ -11,7 +11,7 @@ import numpy as np
 from gvpipe.asset.field import Field
 from gvpipe.foundation.arrays import Bool, Float32, Float64, Int64
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import HIGHER_ORDER, SIZE_OF_TYPE, VOLUMES, Cells
+from gvpipe.grids.cells import HIGHER_ORDER, POLYHEDRON, SIZE_OF_TYPE, SOLID, Cells, listed_cells
 from gvpipe.grids.volume import Volume
 from gvpipe.io.formats import BY_MESHIO
 from gvpipe.io.simulation.dataset import Dataset, surface_values
@@ -75,11 +75,11 @@ def read_volume(frames: StepFrames, names: Sequence[str]) -> Volume | None:
         names: of the surface's attributes and fields, whose numbers inside are read.
     """
     cells, surface = frames.cells, frames.surface
-    is_solid = np.isin(cells.types, list(VOLUMES))
+    is_solid = np.isin(cells.types, list(SOLID))
     solid = np.flatnonzero(is_solid)
     if not len(solid):
         return None
-    own = _corners_of_higher_order(cells.select(solid))
+    own = _as_carried(cells.select(solid))
     inner = np.setdiff1d(own.nodes, surface.points)
     rows = np.concatenate([surface.points, inner])
     number = np.full(int(rows.max()) + 1, -1, np.int64)
@@ -101,13 +101,21 @@ def read_volume(frames: StepFrames, names: Sequence[str]) -> Volume | None:
         made = Field(values, domain, kind, first.unit, name=f"{frames.path}: field {name!r}")
         (point_fields if domain == "point" else cell_fields)[name] = made
     return Volume(
-        Cells(own.types, own.offsets, number[own.nodes]),
+        own.renumbered(number),
         InnerPoints(frames, inner),
         order,
         point_fields,
         cell_fields,
         _solid_blocks(frames.first, is_solid),
     )
+
+
+def _as_carried(cells: Cells) -> Cells:
+    """Polyhedra with the points that their faces have, and cells of arbitrary order as linear ones."""
+    cells = _corners_of_higher_order(cells)
+    if cells.polyhedra is None:
+        return cells
+    return listed_cells(cells.types, cells.polyhedra, cells.nodes[np.repeat(cells.types != POLYHEDRON, cells.sizes)])
 
 
 def _corners_of_higher_order(cells: Cells) -> Cells:
@@ -119,7 +127,7 @@ def _corners_of_higher_order(cells: Cells) -> Cells:
     kept = np.where(types == cells.types, sizes, SIZE_OF_TYPE[types])
     place = np.arange(len(cells.nodes)) - np.repeat(cells.offsets[:-1], sizes)
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(kept)])
-    return Cells(types, offsets, cells.nodes[place < np.repeat(kept, sizes)])
+    return Cells(types, offsets, cells.nodes[place < np.repeat(kept, sizes)], cells.polyhedra)
 
 
 def _solid_blocks(step: Dataset, is_solid: Bool) -> tuple[tuple[str, int], ...]:

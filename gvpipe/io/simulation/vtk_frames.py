@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array, Float64
+from gvpipe.foundation.arrays import Array, Float64, Int64
+from gvpipe.grids.cells import POLYHEDRON
 from gvpipe.io.simulation.file_times import NAME as TIME
 from gvpipe.io.simulation.grid_content import GridContent, grid_content, grid_sequence
 from gvpipe.io.simulation.poly_content import ROLES
@@ -100,7 +101,10 @@ class VtkFrames:
             made.SetPolys(cells)
         else:
             made = import_module(MODEL).vtkUnstructuredGrid()
-            made.SetCells(types, cells)
+            if self._faces is None:
+                made.SetCells(types, cells)
+            else:
+                made.SetPolyhedralCells(types, cells, *self._faces)
         points = import_module("vtkmodules.vtkCommonCore").vtkPoints()
         points.SetData(_vtk(self._points(frame)))
         made.SetPoints(points)
@@ -115,13 +119,22 @@ class VtkFrames:
         return points
 
     @cached_property
+    def _faces(self) -> tuple[Any, Any] | None:
+        """Numbers of faces of each cell, which only polyhedra have, and the faces; VTK 9.4 and later take them so."""
+        cells = self._content.cells
+        if cells.polyhedra is None:
+            return None
+        counts = np.zeros(len(cells.types), np.int64)
+        counts[cells.types == POLYHEDRON] = cells.polyhedra.counts
+        return _cell_array(counts, np.arange(len(cells.polyhedra.sizes))), _cell_array(
+            cells.polyhedra.sizes, cells.polyhedra.nodes
+        )
+
+    @cached_property
     def _cells(self) -> tuple[Any, Any]:
         """Types, which poly data have none of, and cells."""
         cells = self._content.cells
-        made = import_module(MODEL).vtkCellArray()
-        ids = import_module("vtkmodules.util.numpy_support").numpy_to_vtkIdTypeArray
-        made.SetData(ids(cells.offsets), ids(np.ascontiguousarray(cells.nodes)))
-        return None if self._content.volume is None else _vtk(cells.types), made
+        return None if self._content.volume is None else _vtk(cells.types), _cell_array(cells.sizes, cells.nodes)
 
     def _add_numbers(self, group: Any, domain: str, frame: int) -> None:
         for name in self._content.names(domain):
@@ -151,3 +164,11 @@ class VtkFrames:
 def _vtk(values: Array) -> Any:
     """An array of VTK that shares memory with ``values``, and keeps it."""
     return import_module("vtkmodules.util.numpy_support").numpy_to_vtk(np.ascontiguousarray(values))
+
+
+def _cell_array(sizes: Int64, nodes: Int64) -> Any:
+    """Lists of numbers, one after the other, as VTK's array of cells."""
+    ids = import_module("vtkmodules.util.numpy_support").numpy_to_vtkIdTypeArray
+    made = import_module(MODEL).vtkCellArray()
+    made.SetData(ids(np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])), ids(np.ascontiguousarray(nodes)))
+    return made

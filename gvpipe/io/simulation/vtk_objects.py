@@ -46,7 +46,13 @@ MOST_DEPTH = 50  # of blocks in blocks
 
 
 def from_vtk(
-    datasets: Any, times: npt.ArrayLike | None = None, *, fps: float | None = None, real_time: bool = False, name: str = "vtk"
+    datasets: Any,
+    times: npt.ArrayLike | None = None,
+    *,
+    fps: float | None = None,
+    real_time: bool = False,
+    volume: bool = False,
+    name: str = "vtk",
 ) -> MeshSequence:
     """A sequence of what any reader of VTK gives.
 
@@ -56,7 +62,7 @@ def from_vtk(
         times: ``(F,)`` seconds of the data sets; None: those of a reader, or those that data sets tell (``TimeValue`` of their
             field data, or VTK's ``DATA_TIME_STEP``), else none.
         fps: frames per second instead of those of the times.
-        real_time: as of `gvpipe.read`.
+        real_time, volume: as of `gvpipe.read`.
         name: for messages.
 
     Returns:
@@ -75,7 +81,7 @@ def from_vtk(
         steps.times = np.asarray(times, np.float64).reshape(-1)
         if len(steps.times) != steps.n_steps:
             raise InputError(f"{name}: {len(steps.times)} times for {steps.n_steps} data sets; one for each is needed")
-    return _sequence_of(steps, Path(name), ReadOptions(fps=fps, real_time=real_time))
+    return _sequence_of(steps, Path(name), ReadOptions(fps=fps, real_time=real_time, volume=volume))
 
 
 def _sequence_of(steps: VtkSteps, path: Path, options: ReadOptions) -> MeshSequence:
@@ -85,19 +91,21 @@ def _sequence_of(steps: VtkSteps, path: Path, options: ReadOptions) -> MeshSeque
     return replace(sequence, not_carried=tuple(name for name in sequence.not_carried if name not in TOLD))
 
 
-def from_pyvista(source: Any, *, fps: float | None = None, real_time: bool = False, name: str = "pyvista") -> MeshSequence:
+def from_pyvista(
+    source: Any, *, fps: float | None = None, real_time: bool = False, volume: bool = False, name: str = "pyvista"
+) -> MeshSequence:
     """A sequence of PyVista's objects.
 
     Args:
         source: a PyVista reader (``pyvista.get_reader``), whose time steps are read when they are needed; a data set, or a
             sequence of data sets, one for each frame.
-        fps, real_time, name: as of `from_vtk`.
+        fps, real_time, volume, name: as of `from_vtk`.
 
     Raises:
         InputError, TypeError: as `from_vtk` does.
     """
     if not hasattr(source, "read"):
-        return from_vtk(source, fps=fps, real_time=real_time, name=name)
+        return from_vtk(source, fps=fps, real_time=real_time, volume=volume, name=name)
     times = list(getattr(source, "time_values", ()))
 
     def at(step: int) -> Any:
@@ -108,7 +116,7 @@ def from_pyvista(source: Any, *, fps: float | None = None, real_time: bool = Fal
     return _sequence_of(
         VtkSteps(at, max(len(times), 1), np.array(times, np.float64) if times else None),
         Path(name),
-        ReadOptions(fps=fps, real_time=real_time),
+        ReadOptions(fps=fps, real_time=real_time, volume=volume),
     )
 
 

@@ -275,7 +275,7 @@ class VtkHdfSteps:
         return pieces
 
     def _polyhedra(self, types: UInt8, cell: int, number: int) -> Polyhedra | None:
-        """The faces of a part's polyhedra; None where there are none, or in a file of several steps.
+        """The faces of a part's polyhedra; None where there are none.
 
         Args:
             types: of the part's cells.
@@ -283,7 +283,7 @@ class VtkHdfSteps:
             number: of the part.
         """
         at = np.flatnonzero(types == POLYHEDRON)
-        if not len(at) or self._file.find(f"{self._root}/PolyhedronOffsets") is None or self._is_temporal:
+        if not len(at) or self._file.find(f"{self._root}/PolyhedronOffsets") is None:
             return None
         if any(len(self._sizes(name)) <= number for name in POLYHEDRON_SIZES):
             raise ValueError(f"it has no sizes of the polyhedra of part {number}")

@@ -16,16 +16,19 @@ from typing import Any
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.grids.cells import POLYHEDRON, Cells
+from gvpipe.grids.polyhedra import Polyhedra
 from gvpipe.io.library.writing_process import write_by
 from gvpipe.io.losses import renamed_note
 from gvpipe.io.simulation.grid_content import grid_content, grid_sequence, inside_notes
 from gvpipe.io.simulation.hdf import import_h5py
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
-from gvpipe.io.simulation.vtkhdf import ASSEMBLY, POLY_GROUPS, ROOT, UNIT
+from gvpipe.io.simulation.vtkhdf import ASSEMBLY, POLY_GROUPS, POLYHEDRON_SIZES, ROOT, UNIT
 from gvpipe.io.simulation.vtkhdf_blocks import Block, find_blocks, own_blocks
 from gvpipe.model.sequence import MeshSequence
 
-VERSION = (2, 3)
+VERSION, POLYHEDRA_VERSION = (2, 3), (2, 5)
+POLYHEDRON_STEPS = ("FaceConnectivityOffsets", "FaceOffsetsOffsets", "PolyhedronToFaceIdOffsets")
 GROUPS = (("PointData", "vertex"), ("CellData", "triangle"))
 SIZES = ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds")
 CHUNK = 1 << 16  # rows of a compressed chunk at most
@@ -87,7 +90,10 @@ def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str,
         for key, values in (("Types", cells.types), ("Offsets", cells.offsets), ("Connectivity", cells.nodes)):
             _dataset(root, key, values.shape, values.dtype)[...] = values
         steps = _start_steps(root, sequence, sequence.n_vertices)
-        for key in ("CellOffsets", "ConnectivityIdOffsets"):
+        tables = ["CellOffsets", "ConnectivityIdOffsets"]
+        if cells.polyhedra is not None:
+            tables += _write_polyhedra(root, cells, cells.polyhedra)
+        for key in tables:
             steps[key] = np.zeros(n_frames, np.int64)
         _write_texts(h5py, root, content.surface, n_frames)
         points = _dataset(root, "Points", (n_frames * rows["vertex"], 3), np.dtype("f8" if is_far else "f4"))
@@ -113,6 +119,26 @@ def write_grid_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str,
                 target[start * rows[domain] : stop * rows[domain]] = values.reshape(-1, *target.shape[1:])
     names = [(key, safe_name(key)) for _, domain in GROUPS for key in content.names(domain)]
     return (*content.notes, *renamed_note(names, "VTKHDF"))
+
+
+def _write_polyhedra(root: Any, cells: Cells, polyhedra: Polyhedra) -> tuple[str, ...]:
+    """Write the faces of polyhedra; returns the tables of steps that this needs."""
+    root.attrs["Version"] = np.array(POLYHEDRA_VERSION, np.int64)
+    counts = np.zeros(len(cells.types), np.int64)
+    counts[cells.types == POLYHEDRON] = polyhedra.counts
+    n_faces = len(polyhedra.sizes)
+    for key, count in zip(POLYHEDRON_SIZES, (n_faces, len(polyhedra.nodes), n_faces), strict=True):
+        root[key] = np.array([count], np.int64)
+    zero = np.zeros(1, np.int64)
+    lists = {
+        "FaceOffsets": np.concatenate([zero, np.cumsum(polyhedra.sizes)]),
+        "FaceConnectivity": polyhedra.nodes,
+        "PolyhedronOffsets": np.concatenate([zero, np.cumsum(counts)]),
+        "PolyhedronToFaces": np.arange(n_faces),
+    }
+    for key, values in lists.items():
+        _dataset(root, key, values.shape, values.dtype)[...] = values
+    return POLYHEDRON_STEPS
 
 
 def start_set(above: Any, path: str, kind: str) -> Any:

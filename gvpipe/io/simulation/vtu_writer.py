@@ -9,9 +9,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from gvpipe.foundation.arrays import Array
+from gvpipe.foundation.arrays import Array, Int64
 from gvpipe.foundation.atomic import atomic_files
 from gvpipe.foundation.errors import InputError
+from gvpipe.grids.cells import POLYHEDRON, Cells
+from gvpipe.grids.polyhedra import Polyhedra
 from gvpipe.io.frames.pattern import match_pattern
 from gvpipe.io.simulation.grid_content import GridContent, grid_content, grid_sequence
 from gvpipe.io.simulation.vtp_writer import Appended
@@ -57,6 +59,14 @@ def write_grids(sequence: MeshSequence, place: Callable[[int], Path]) -> tuple[s
     return content.notes
 
 
+def _face_arrays(cells: Cells, polyhedra: Polyhedra) -> dict[str, Int64]:
+    """The faces of polyhedra as streams, which all versions of VTK read; -1 for other cells."""
+    stream, ends = polyhedra.streams()
+    stops = np.full(len(cells.types), -1, np.int64)
+    stops[cells.types == POLYHEDRON] = ends
+    return {"faces": stream, "faceoffsets": stops}
+
+
 def _vtu(content: GridContent, points: Array, frame: int) -> bytes:
     """One frame as a whole file."""
     appended = Appended()
@@ -70,6 +80,9 @@ def _vtu(content: GridContent, points: Array, frame: int) -> bytes:
     cells = appended.element("connectivity", content.cells.nodes.astype(integer))
     cells += appended.element("offsets", content.cells.offsets[1:].astype(integer))
     cells += appended.element("types", content.cells.types)
+    if content.cells.polyhedra is not None:
+        for name, values in _face_arrays(content.cells, content.cells.polyhedra).items():
+            cells += appended.element(name, values.astype(integer))
     head = (
         '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
         'header_type="UInt64" compressor="vtkZLibDataCompressor"><UnstructuredGrid>'

@@ -16,7 +16,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gvpipe.foundation.arrays import Array, Float64, Floats
-from gvpipe.grids.cells import SIZES, Cells, equal_cells
+from gvpipe.grids.cells import POLYHEDRON, SIZES, Cells, equal_cells, listed_cells
+from gvpipe.grids.polyhedra import from_streams, ranges
 from gvpipe.io.damage import reading
 from gvpipe.io.options import ReadOptions
 from gvpipe.io.simulation.blocks import join_blocks
@@ -39,7 +40,7 @@ NAMES = {"TRIANGLE": 5, "QUADRILATERAL": 9, "TETRAHEDRON": 10, "PYRAMID": 14, "W
          "HEXAHEDRON_24": 33, "HEX_24": 33, "HEXAHEDRON_27": 29, "HEX_27": 29,
          "EDGE_3": 21, "POLYVERTEX": 2, "POLYLINE": 4, "POLYGON": 7}  # fmt: skip
 NUMBERS = {1: 2, 2: 4, 3: 7, 4: 5, 5: 9, 6: 10, 7: 14, 8: 13, 9: 12, 34: 21, 35: 28, 36: 22, 37: 23, 38: 24, 39: 27, 40: 26,
-           41: 32, 48: 25, 49: 33, 50: 29}  # fmt: skip
+           16: 42, 41: 32, 48: 25, 49: 33, 50: 29}  # fmt: skip
 CORNERS = {5: 3, 9: 4, 10: 4, 14: 5, 13: 6, 12: 8}
 COMPONENTS = {"SCALAR": 1, "VECTOR": 3, "TENSOR": 9, "TENSOR6": 6}
 
@@ -307,10 +308,19 @@ def _mixed(flat: Array) -> Cells:
     sizes: list[int] = []
     at = 0
     numbers = flat.tolist()
+    streams: list[tuple[int, int]] = []
     while at < len(numbers):  # every cell says where the next one starts
         kind = NUMBERS.get(numbers[at])
         if kind is None:
             raise ValueError(f"its topology has a cell of type {numbers[at]}, which is not read")
+        if kind == POLYHEDRON:
+            stop = _end_of_stream(numbers, at + 1)
+            streams.append((at + 1, stop))
+            types.append(kind)
+            starts.append(at + 1)
+            sizes.append(0)
+            at = stop
+            continue
         has_count = not SIZES.get(kind)
         size = SIZES.get(kind) or (numbers[at + 1] if at + 1 < len(numbers) else -1)
         start = at + 1 + has_count
@@ -320,6 +330,19 @@ def _mixed(flat: Array) -> Cells:
         starts.append(start)
         sizes.append(size)
         at = start + size
-    ends = np.cumsum([0, *sizes])
-    within = np.arange(ends[-1]) - np.repeat(ends[:-1], sizes)
-    return Cells(np.array(types, np.uint8), ends.astype(np.int64), flat[np.repeat(np.array(starts, np.int64), sizes) + within])
+    kinds, counts = np.array(types, np.uint8), np.array(sizes, np.int64)
+    nodes = flat[ranges(np.array(starts, np.int64), counts)]
+    bounds = np.array(streams, np.int64).reshape(-1, 2)
+    return listed_cells(kinds, from_streams(flat.astype(np.int64), bounds[:, 0], bounds[:, 1]), nodes, counts)
+
+
+def _end_of_stream(numbers: list[int], at: int) -> int:
+    """Where a polyhedron's faces end: their number, then for each the number of its corners and these."""
+    if at >= len(numbers):
+        raise ValueError("its mixed topology is cut short")
+    left, at = numbers[at], at + 1
+    while left > 0 and at < len(numbers) and numbers[at] >= 0:
+        left, at = left - 1, at + 1 + numbers[at]
+    if left or at > len(numbers):
+        raise ValueError("its mixed topology is cut short")
+    return at

@@ -8,6 +8,7 @@ Source: XDMF model and format, www.xdmf.org (topology types, temporal collection
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
@@ -16,7 +17,9 @@ import numpy as np
 
 from gvpipe.foundation.arrays import Array
 from gvpipe.foundation.atomic import atomic_files
-from gvpipe.grids.cells import Cells
+from gvpipe.foundation.errors import InputError
+from gvpipe.grids.cells import POLYHEDRON, Cells
+from gvpipe.grids.polyhedra import ranges
 from gvpipe.io.library.writing_process import write_by
 from gvpipe.io.simulation.grid_content import GridContent, grid_content, grid_sequence, inside_notes
 from gvpipe.io.simulation.hdf import import_h5py
@@ -25,7 +28,8 @@ from gvpipe.model.sequence import MeshSequence
 
 TYPE_NUMBERS = {kind: number for number, kind in NUMBERS.items()}
 TYPE_NAMES = {kind: name for name, kind in reversed(NAMES.items())}  # the first of several
-POLYGON = 7
+POLYGON, VOXEL, HEXAHEDRON = 7, 11, 12
+HEXAHEDRON_OF_VOXEL = (0, 1, 3, 2, 4, 5, 7, 6)
 CHUNK = 1 << 16  # rows of a compressed chunk at most
 KINDS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 CENTRES = {"vertex": "Node", "triangle": "Cell"}
@@ -40,14 +44,39 @@ def write_xdmf(sequence: MeshSequence, path: Path) -> tuple[str, ...]:
     """
     import_h5py(str(path))
     lost: tuple[str, ...] = ()
+    turned: tuple[str, ...] = ()
     if sequence.volume is not None:
         sequence, lost = grid_sequence(sequence, sequence.volume)
+        sequence, turned = _with_known_types(sequence, path)
     with atomic_files(path.parent) as folder:
         heavy = folder / f"{path.stem}.h5"
         notes = write_by(__name__, "write_here", sequence, heavy)
         content = grid_content(sequence, "XDMF", parts="numbers")
         (folder / path.name).write_text(_light(sequence, content, heavy.name), "utf-8")
-    return (*notes, *inside_notes("XDMF", lost))
+    return (*notes, *inside_notes("XDMF", lost), *turned)
+
+
+def _with_known_types(sequence: MeshSequence, path: Path) -> tuple[MeshSequence, tuple[str, ...]]:
+    """The same with hexahedra in place of VTK's voxels, which XDMF has not, and a note.
+
+    Raises:
+        InputError: cells of other types that XDMF has not.
+    """
+    volume = sequence.volume
+    if volume is None:
+        return sequence, ()
+    cells = volume.cells
+    strange = sorted(set(np.unique(cells.types).tolist()) - {*TYPE_NUMBERS, VOXEL})
+    if strange:
+        raise InputError(f"{path}: XDMF has no cells of VTK's type {strange[0]}; write .vtu, .pvd or .vtkhdf")
+    at = np.flatnonzero(cells.types == VOXEL)
+    if not len(at):
+        return sequence, ()
+    types, nodes = cells.types.copy(), cells.nodes.copy()
+    types[at] = HEXAHEDRON
+    nodes[cells.offsets[at, None] + np.arange(8)] = cells.nodes[cells.offsets[at, None] + np.array(HEXAHEDRON_OF_VOXEL)]
+    made = replace(volume, cells=Cells(types, cells.offsets, nodes, cells.polyhedra))
+    return replace(sequence, volume=made), ("XDMF has no voxels; they are written as hexahedra",)
 
 
 def write_here(sequence: MeshSequence, path: Path, name: str) -> tuple[str, ...]:
@@ -80,21 +109,30 @@ def _put(file: Any, name: str, values: Array) -> None:
 def _uniform(cells: Cells) -> int | None:
     """The type of all cells, None where they differ or have any number of corners."""
     kinds = np.unique(cells.types).tolist()
-    return kinds[0] if len(kinds) == 1 and kinds[0] != POLYGON else None
+    return kinds[0] if len(kinds) == 1 and kinds[0] not in (POLYGON, POLYHEDRON) else None
 
 
 def _topology(cells: Cells) -> Array:
-    """``(M, n)`` nodes of cells of one type; else one row of each cell's type, size if it may have any, and nodes."""
+    """``(M, n)`` nodes of cells of one type; else one row of each cell's type, size if it may have any, and nodes.
+
+    Polyhedra have their number of faces, and for each its number of corners and these.
+    """
     if _uniform(cells) is not None:
         return cells.nodes.reshape(len(cells.types), -1)
-    sizes = cells.sizes
+    nodes, sizes = cells.nodes, cells.sizes
+    if cells.polyhedra is not None:
+        stream, ends = cells.polyhedra.streams()
+        is_free = cells.types == POLYHEDRON
+        sizes[is_free] = np.diff(ends, prepend=0)
+        of_free = np.repeat(is_free, sizes)
+        nodes = np.empty(len(of_free), np.int64)
+        nodes[of_free], nodes[~of_free] = stream, cells.nodes[np.repeat(~is_free, cells.sizes)]
     heads = np.where(cells.types == POLYGON, 2, 1)
     starts = np.cumsum(sizes + heads) - sizes - heads
     flat = np.empty(int((sizes + heads).sum()), np.int64)
     flat[starts] = np.array([TYPE_NUMBERS.get(kind, 0) for kind in range(256)])[cells.types]
     flat[starts[heads == 2] + 1] = sizes[heads == 2]
-    place = np.arange(len(cells.nodes)) - np.repeat(cells.offsets[:-1], sizes)
-    flat[np.repeat(starts + heads, sizes) + place] = cells.nodes
+    flat[ranges(starts + heads, sizes)] = nodes
     return flat
 
 

@@ -21,9 +21,10 @@ export const VOLUME_LIST_SECTION = "volume";
 export const VOLUME_LIST_CELLS = "volume.cells";
 export const VOLUME_LIST_ORDER = "volume.order";
 export const VOLUME_LIST_POINTS = "volume.points";
-export const VOLUME_LIST_VERSION = 1;
+export const VOLUME_LIST_VERSION = 2;
 export const VOLUME_LIST_IN_ORDER = 0;
 export const VOLUME_LIST_BY_WALK = 1;
+export const VOLUME_LIST_BY_CORNERS = 2;
 export const VOLUME_LIST_MAX_BYTES = 16777216;
 export const VOLUME_LIST_MOST_CELLS = 1073741824;
 export const VOLUME_LIST_MOST_POINTS = 16777216;
@@ -31,7 +32,7 @@ export const VOLUME_LIST_MOST_POINTS = 16777216;
 // gvpipe.asset_coding.volume_reader
 export const VOLUME_READER_BYTES_PER_CELL = 1200;
 export const VOLUME_READER_SECONDS_PER_CELL = 6e-06;
-export const VOLUME_READER_BYTES_PER_POINT = 1500;
+export const VOLUME_READER_BYTES_PER_POINT = 700;
 export const VOLUME_READER_SECONDS_PER_POINT = 8e-06;
 
 // gvpipe.attributes.linear_kernels
@@ -72,6 +73,13 @@ export const BASE_MESH_MAX_PER_BYTE = 1024;
 
 // gvpipe.connectivity.cell_kernels
 export const CELL_KERNELS_N_CONTEXTS = 526;
+
+// gvpipe.connectivity.cell_middles
+export const CELL_MIDDLES_MIDDLES = new Map([[24, [10, [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]]], [25, [12, [[0, 1], [1, 2], [2, 3], [0, 3], [4, 5], [5, 6], [6, 7], [4, 7], [0, 4], [1, 5], [2, 6], [3, 7]]]], [26, [13, [[0, 1], [1, 2], [0, 2], [3, 4], [4, 5], [3, 5], [0, 3], [1, 4], [2, 5]]]], [27, [14, [[0, 1], [1, 2], [2, 3], [0, 3], [0, 4], [1, 4], [2, 4], [3, 4]]]], [29, [12, [[0, 1], [1, 2], [2, 3], [0, 3], [4, 5], [5, 6], [6, 7], [4, 7], [0, 4], [1, 5], [2, 6], [3, 7], [0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 2, 3, 4, 5, 6, 7]]]]]);
+
+// gvpipe.connectivity.cell_traversal
+export const CELL_TRAVERSAL_KEEPS = 1;
+export const CELL_TRAVERSAL_RANKED = 2;
 
 // gvpipe.connectivity.cell_poses
 export const CELL_POSES_KINDS = [10, 12, 13, 14];

@@ -52,7 +52,7 @@ def test_ensight_s_polyhedra_behind_a_blank_line(tmp_path: Path) -> None:
     assert len(found.faces) == 12 and found.polygons is not None and found.polygons.tolist() == [4] * 6
     a, b, c = (found[0][found.faces[:, k]].astype(float) for k in range(3))
     assert (a * np.cross(b, c)).sum() / 6 == pytest.approx(1)
-    assert found.attributes["load"].values[0] == 5 and "polyhedra but for their surface" in found.not_carried
+    assert found.attributes["load"].values[0] == 5 and "volume cells" in found.not_carried
 
 
 def test_a_blank_line_before_ascii(tmp_path: Path) -> None:

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cell_grids import lattice, sequence_of, voronoi
 
 import gvpipe
 from gvpipe.foundation.errors import InputError
-from gvpipe.grids.cells import Cells, join_cells
+from gvpipe.grids.cells import Cells, equal_cells, join_cells
 from gvpipe.grids.polyhedra import Polyhedra, from_faces, from_streams
 from gvpipe.io.simulation.surface import extract_surface
 
 POINTS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1, 2, 3)], np.float64)
+PENTAGON = ((0, 0), (2, 0), (3, 1), (1, 2), (-1, 1))
 HEXAHEDRON = [1, 2, 6, 5, 9, 10, 14, 13]
 
 
@@ -52,7 +54,7 @@ def test_the_surface_is_closed_and_looks_outwards(turned: bool) -> None:
     forth = {tuple(edge) for edge in edges.tolist()}
     assert len(forth) == len(edges) and all((b, a) in forth for a, b in forth)
     assert sorted(set(surface.cells.tolist())) == [0, 1, 2] and surface.polygons is not None
-    assert "polyhedra but for their surface (2)" in surface.not_carried and "volume cells" in surface.not_carried
+    assert "volume cells (3)" in surface.not_carried and not surface.without_inside
 
 
 def test_selected_and_joined() -> None:
@@ -117,7 +119,7 @@ def check(sequence: gvpipe.MeshSequence) -> None:
     surface = extract_surface(grid(), POINTS)
     assert np.array_equal(sequence[0], POINTS) and len(sequence.faces) == len(surface.faces)
     load = sequence.attributes["load"].values[:, 0]
-    assert sorted(set(load.tolist())) == [1.5, 2.5, 3.5] and any("polyhedra" in name for name in sequence.not_carried)
+    assert sorted(set(load.tolist())) == [1.5, 2.5, 3.5] and "volume cells (3)" in sequence.not_carried
 
 
 @pytest.mark.parametrize("new", [False, True])
@@ -125,11 +127,14 @@ def test_vtu_of_both_layouts(new: bool, tmp_path: Path) -> None:
     (tmp_path / "a.vtu").write_text(vtu(grid(), new))
     check(gvpipe.read(tmp_path / "a.vtu"))
     volume = gvpipe.read(tmp_path / "a.vtu", volume=True)
-    assert volume.volume is not None and volume.volume.cells.types.tolist() == [12]
-    assert "polyhedra but for their surface (2)" in volume.not_carried
+    assert volume.volume is not None and volume.volume.cells.types.tolist() == [42, 12, 42] and not volume.not_carried
     gvpipe.encode(volume, tmp_path / "a.mp4", "pca")
     again = gvpipe.open(tmp_path / "a.mp4").sequence()
     assert again.volume is not None and len(again.faces) == len(volume.faces)
+    for name in ("b.vtu", "b.vtkhdf", "b.xdmf"):
+        gvpipe.write(again, tmp_path / name)
+        back = gvpipe.read(tmp_path / name, volume=True).volume
+        assert back is not None and back.cells.equals(volume.volume.cells)
     text = vtu(grid(), new).replace("polyhedron_offsets", "x").replace("faceoffsets", "x")
     (tmp_path / "b.vtu").write_text(text)
     with pytest.raises(InputError, match="2 of its cells are polyhedra without a list of their faces"):
@@ -169,3 +174,31 @@ def test_vtkhdf_has_numbers_of_faces(tmp_path: Path) -> None:
             root[name] = values
         root.create_group("CellData")["load"] = np.array([1.5, 2.5, 3.5], np.float32)
     check(gvpipe.read(tmp_path / "a.vtkhdf"))
+
+
+def test_data_objects_of_vtk_hold_polyhedra() -> None:
+    pytest.importorskip("vtkmodules")
+    given = sequence_of(*voronoi(12))
+    objects = [gvpipe.to_vtk(given, frame) for frame in range(len(given))]
+    back = gvpipe.from_vtk(objects, [0, 1, 2], volume=True)
+    assert objects[0].GetCellType(0) == 42 and back.volume is not None and given.volume is not None
+    own, other = (each.cells.renumbered(np.asarray(each.order)) for each in (given.volume, back.volume))
+    assert own.polyhedra is not None and other.polyhedra is not None and own.polyhedra.equals(other.polyhedra)
+    assert gvpipe.from_vtk(objects, [0, 1, 2]).volume is None
+
+
+@pytest.mark.parametrize("kind", [11, 15])
+def test_cells_that_xdmf_has_not(kind: int, tmp_path: Path) -> None:
+    """Voxels become hexahedra of the same corners; prisms are refused by name, and no file is left."""
+    pytest.importorskip("h5py")
+    corners = lattice((2, 2, 2)) if kind == 11 else np.array([[x, y, z] for z in (0, 1) for x, y in PENTAGON], np.float64)
+    given = sequence_of(equal_cells(kind, np.arange(len(corners))[None]), corners)
+    if kind == 15:
+        with pytest.raises(InputError, match=r"XDMF has no cells of VTK's type 15; write .vtu, .pvd or .vtkhdf"):
+            gvpipe.write(given, tmp_path / "a.xdmf")
+        assert not list(tmp_path.iterdir())
+        return
+    gvpipe.write(given, tmp_path / "a.xdmf")
+    found = gvpipe.read(tmp_path / "a.xdmf", volume=True)
+    assert found.volume is not None and found.volume.cells.types.tolist() == [12]
+    assert np.array_equal(np.asarray(found[0])[found.volume.cells.nodes], corners[[0, 1, 3, 2, 4, 5, 7, 6]].astype(np.float32))

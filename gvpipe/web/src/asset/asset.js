@@ -78,8 +78,7 @@ export async function readAsset(payload, video, positions) {
   const fields = readFields(list, payload, { frameCount, vertexCount, triangleCount, polygons, host }, notes);
   const metadata = await readMetadata(list, payload);
   const surface = { code, faces, vertexCount, polygons, frameCount };
-  const volume = hasVolume(payload) ? await readVolume(payload, surface) : null;
-  if (!volume && hasVolume(payload)) notes.push("what lies inside is not shown: a newer gvpipe wrote it");
+  const volume = hasVolume(payload) ? await readVolume(payload, surface, notes) : null;
   const close = () => {
     host.close();
     volume?.close();

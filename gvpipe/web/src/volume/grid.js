@@ -1,6 +1,7 @@
 /** The grid of a volume from its sections, and the graphs of its rows; by kernels, in a worker. */
 
 import {
+  VOLUME_LIST_BY_CORNERS as BY_CORNERS,
   VOLUME_LIST_BY_WALK as BY_WALK,
   VOLUME_LIST_CELLS as CELLS,
   VOLUME_LIST_IN_ORDER as IN_ORDER,
@@ -21,10 +22,12 @@ import { decodeWalk } from "./walk.js";
  */
 export async function openGrid(kernels, surface, { sections, counts }) {
   const [way, data] = [sections.cells[0], sections.cells.subarray(1)];
-  if (way !== IN_ORDER && way !== BY_WALK) throw corrupt(CELLS, `it is coded by way ${way}`);
+  if (![IN_ORDER, BY_WALK, BY_CORNERS].includes(way)) throw corrupt(CELLS, `it is coded by way ${way}`);
   const order = await decodeOrder(sections.order, counts.vertices, counts.points, ORDER);
   const cells =
-    way === BY_WALK ? await decodeWalk(kernels, data, surface, counts, CELLS) : renumbered(await decodeCells(data, counts.cells, counts.points, CELLS), order);
+    way === IN_ORDER
+      ? renumbered(await decodeCells(data, counts.cells, counts.points, CELLS), order)
+      : await decodeWalk(kernels, data, surface, counts, { name: CELLS, isLinear: way === BY_WALK });
   const { triangles, inner, edges } = cellRows(cells, surface.faces, surface.polygons);
   const orders = {
     point: () => graphOrder(pointEdges(cells, counts.vertices), counts.inner),

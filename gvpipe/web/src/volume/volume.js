@@ -41,13 +41,21 @@ export function hasVolume(payload) {
  * @param {import("../format/payload.js").Payload} payload of a file that `hasVolume`
  * @param {{code: Uint8Array, faces: Int32Array, vertexCount: number, polygons: Int32Array|null, frameCount: number}} surface and the
  *   code of kernels
- * @returns {Promise<Volume|null>} null: a newer gvpipe wrote it
+ * @param {string[]} notes to which a line is added where nothing is returned
+ * @returns {Promise<Volume|null>} null: a newer gvpipe wrote it, or it has polyhedra
  * @throws {GeometryVideoError} it is not as gvpipe writes it
  */
-export async function readVolume(payload, surface) {
+export async function readVolume(payload, surface, notes) {
   const data = await sectionOf(payload, SECTION);
   const list = new AssetEntry(await readJson(data, payload.budget, MAX_BYTES, SECTION), "the volume's list");
-  if (list.integer("version", undefined, 1, 2 ** 31) > VERSION) return null;
+  if (list.integer("version", undefined, 1, 2 ** 31) > VERSION) {
+    notes.push("what lies inside is not shown: a newer gvpipe wrote it");
+    return null;
+  }
+  if (list.flag("polyhedra", false)) {
+    notes.push("what lies inside is not shown: it has polyhedra, which gvpipe's Python alone decodes");
+    return null;
+  }
   const counts = {
     vertices: surface.vertexCount,
     inner: list.integer("points", undefined, 0, MOST_POINTS),

@@ -8,10 +8,13 @@ import {
   CELL_POSES_MOST_FACES as MOST_FACES,
   CELL_POSES_MOST_NODES as MOST_NODES,
   CELL_POSES_MOST_POSES as MOST_POSES,
+  CELL_TRAVERSAL_KEEPS as KEEPS,
+  CELL_TRAVERSAL_RANKED as RANKED,
 } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { previousEqual } from "../format/points.js";
 import { SerialStream } from "../format/serial_stream.js";
+import { cornersOf, readTypes, withMiddles } from "./middles.js";
 import { checkOrder, inflateAll } from "./cells.js";
 import { cornerOf, edgesOf, polygonStarts } from "./grid_faces.js";
 import { fromPlanes } from "./planes.js";
@@ -20,36 +23,41 @@ import { fromPlanes } from "./planes.js";
  * @param {import("../wasm/kernels.js").Kernels} given kernels, whose memory is not used
  * @param {Uint8Array} data the section @param {{faces: Int32Array, polygons: Int32Array|null}} surface
  * @param {{vertices: number, points: number, cells: number}} counts points of the surface and in all, and M
- * @param {string} name of the section, for messages
+ * @param {{name: string, isLinear: boolean}} about the section's name, for messages, and whether cells have corners alone
  * @returns {Promise<import("./grid_faces.js").Cells>} in the source's order, if it was kept
  * @throws {GeometryVideoError} it is not as gvpipe writes it
  */
-export async function decodeWalk(given, data, { faces, polygons }, counts, name) {
+export async function decodeWalk(given, data, { faces, polygons }, counts, { name, isLinear }) {
   const kernels = given.fresh();
   const cursor = new Cursor(data, name);
-  const keeps = cursor.u8() === 1;
-  const seeds = walkingOrder(markedSeeds(faces, polygons, cursor.block(), cursor));
+  const head = isLinear ? { types: KINDS, corners: counts.points, isLate: false } : readTypes(cursor, counts);
+  const flags = cursor.u8();
+  const [keeps, isRanked] = [(flags & KEEPS) !== 0, (flags & RANKED) !== 0];
+  const marked = markedSeeds(faces, polygons, cursor.block(), isLinear ? [3, 4] : [3, 4, 6, 8], cursor);
+  const sides = [];
+  const seeds = walkingOrder(marked.map((seed) => cornersOf(seed, head.isLate, sides)));
   const stream = new SerialStream(kernels, cursor.block(), N_CONTEXTS, name);
   const source = [[0], [0, MOST_NODES], [0, MOST_FACES], [0]].map((shape) => kernels.array("int64", shape));
   const shapes = [kernels.whole(seeds.flatMap(({ nodes }) => nodes), [seeds.length, 4]), kernels.whole(seeds.map(({ size }) => size))];
-  const limits = [counts.vertices, counts.points, counts.cells];
-  const found = kernels.call("code_cells", ...stream.arrays, ...placedPoses(kernels), ...source, ...shapes, ...limits, keeps);
+  const limits = [counts.vertices, head.corners, counts.cells];
+  const found = kernels.call("code_cells", ...stream.arrays, ...placedPoses(kernels), ...source, ...shapes, ...limits, keeps, isRanked);
   stream.end();
-  const [kinds, nodes] = [kernels.numbers(found[0]), kernels.numbers(found[1])];
+  const coded = { kinds: kernels.numbers(found[0]), nodes: kernels.numbers(found[1]), width: MOST_NODES, types: head.types };
+  const walk = isLinear ? coded : withMiddles(coded, sides, head.corners, counts.points, cursor);
   if (!keeps) {
     cursor.end();
-    return asCells(kinds, nodes, null, null);
+    return asCells(walk, null, null);
   }
   const sources = fromPlanes(await inflateAll(cursor.block(), 4 * counts.cells, cursor), counts.cells);
   const nInner = counts.points - counts.vertices;
   const inner = fromPlanes(await inflateAll(cursor.rest(), 4 * nInner, cursor), nInner);
   checkOrder(sources, 0, counts.cells, cursor);
   checkOrder(inner, counts.vertices, counts.points, cursor);
-  return asCells(kinds, nodes, sources, { inner, vertices: counts.vertices });
+  return asCells(walk, sources, { inner, vertices: counts.vertices });
 }
 
-/** Polygons with a cell behind them: `{nodes: four, size}`; the fourth node of a triangle is 0. */
-function markedSeeds(faces, polygons, mask, cursor) {
+/** Polygons with a cell behind them: `{nodes, size}`; the fourth node of a triangle is 0. */
+function markedSeeds(faces, polygons, mask, sizes, cursor) {
   const starts = polygonStarts(faces, polygons);
   if (mask.length && mask.length !== Math.ceil(starts.length / 8)) {
     throw cursor.corrupt(`it has marks of ${8 * mask.length} polygons, and there are ${starts.length}`);
@@ -58,8 +66,8 @@ function markedSeeds(faces, polygons, mask, cursor) {
   for (let p = 0; p < starts.length; p++) {
     if (mask.length && !((mask[p >> 3] >> (7 - (p & 7))) & 1)) continue;
     const size = polygons ? polygons[p] : 3;
-    if (size > 4) throw cursor.corrupt("it has cells behind polygons of more than four corners");
-    seeds.push({ nodes: [0, 1, 2, 3].map((i) => (i < size ? cornerOf(faces, starts[p], i) : 0)), size });
+    if (!sizes.includes(size)) throw cursor.corrupt(`it has cells behind polygons of more than ${sizes.at(-1)} corners`);
+    seeds.push({ nodes: Array.from({ length: Math.max(size, 4) }, (_, i) => (i < size ? cornerOf(faces, starts[p], i) : 0)), size });
   }
   return seeds;
 }
@@ -93,17 +101,17 @@ function walkingOrder(seeds) {
   return order.map((p) => seeds[p]);
 }
 
-function asCells(kinds, nodes, sources, renamed) {
+function asCells({ kinds, nodes, width, types: ofKinds }, sources, renamed) {
   const count = kinds.length;
   const rows = new Int32Array(count); // of the walk, for each cell
   for (let row = 0; row < count; row++) rows[sources ? sources[row] : row] = row;
-  const types = Uint8Array.from(rows, (row) => KINDS[kinds[row]]);
+  const types = Uint8Array.from(rows, (row) => ofKinds[kinds[row]]);
   const offsets = new Int32Array(count + 1);
   types.forEach((type, cell) => (offsets[cell + 1] = offsets[cell] + SIZES.get(type)));
   const result = new Int32Array(offsets[count]);
   for (let cell = 0; cell < count; cell++) {
     for (let i = offsets[cell]; i < offsets[cell + 1]; i++) {
-      const node = nodes[MOST_NODES * rows[cell] + i - offsets[cell]];
+      const node = nodes[width * rows[cell] + i - offsets[cell]];
       result[i] = renamed && node >= renamed.vertices ? renamed.inner[node - renamed.vertices] : node;
     }
   }
