@@ -11,10 +11,10 @@ Errors in percent (`gvpipe.metrics.vertex_errors`). The logarithm falls evenly, 
 
 from __future__ import annotations
 
-import math
+from gvpipe.foundation.elementary import exp, log
 
 MIDDLE, ERROR = 75.0, 0.14  # a quality and its error, percent
-BELOW, ABOVE = math.log(5) / 25, math.log(7) / 25  # fall of the logarithm per unit of quality
+BELOW, ABOVE = log(5) / 25, log(7) / 25  # fall of the logarithm per unit of quality
 
 
 def error_of(quality: float) -> float:
@@ -24,7 +24,7 @@ def error_of(quality: float) -> float:
         >>> error_of(75), round(error_of(50), 6)
         (0.14, 0.7)
     """
-    return ERROR * math.exp((MIDDLE - quality) * fall_at(quality))
+    return ERROR * exp((MIDDLE - quality) * fall_at(quality))
 
 
 def quality_of(error: float) -> float:
@@ -34,7 +34,7 @@ def quality_of(error: float) -> float:
         >>> quality_of(0.14), quality_of(100)
         (75.0, 0.0)
     """
-    fall = math.log(ERROR / error)
+    fall = log(ERROR / error)
     return on_scale(MIDDLE + fall / (BELOW if fall < 0 else ABOVE))
 
 

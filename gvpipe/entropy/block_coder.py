@@ -22,6 +22,7 @@ from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, check_sizes, model
 from gvpipe.foundation.arrays import Int64, Integers, UInt8
+from gvpipe.foundation.elementary import log2
 
 PARAMETRIC = 1  # kind of a table that two numbers describe
 
@@ -147,7 +148,7 @@ def _describe(counts: Int64) -> tuple[bytes, Int64]:
     if size < 2 or size > parametric_tables.N_TOKENS:
         return described, frequencies
     used = counts > 0
-    bits = -(counts[used] * np.log2(frequencies[used] / frequencies.sum())).sum() + 8 * len(described)
+    bits = -(counts[used] * log2(frequencies[used] / frequencies.sum())).sum() + 8 * len(described)
     zero, ratio, bits_parametric = parametric_tables.best(np.pad(counts, (0, parametric_tables.N_TOKENS - size)))
     if bits_parametric + 8 * 3 < bits:
         return varint(PARAMETRIC) + bytes([zero, ratio]), parametric_tables.table(zero, ratio)

@@ -14,7 +14,8 @@ import functools
 import numpy as np
 
 from gvpipe.entropy.tokens import DIRECT
-from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.elementary import log2
 
 N_TOKENS = 40  # magnitudes below 2**15
 RATIO_BITS = 12
@@ -57,12 +58,16 @@ def table(zero: int, ratio: int) -> Int64:
 def best(counts: Int64) -> tuple[int, int, float]:
     """Return the ``zero`` and ``ratio`` that code tokens of these ``counts (N_TOKENS,)`` best, and the bits that takes."""
     zero = int(np.clip(round(ZEROS * counts[0] / max(1, counts.sum())), 1, ZEROS - 1))
-    costs = []
-    for ratio in range(len(RATIOS)):
-        frequencies = table(zero, ratio)
-        costs.append(float(-(counts * np.log2(frequencies / frequencies.sum())).sum()))
-    ratio = int(np.argmin(costs))
-    return zero, ratio, costs[ratio]
+    costs = (counts * _bits(zero)).sum(axis=1)
+    ratio = int(costs.argmin())
+    return zero, ratio, float(costs[ratio])
+
+
+@functools.cache
+def _bits(zero: int) -> Float64:
+    """Bits ``(R, N_TOKENS)`` of a token by ratio."""
+    tables = np.stack([table(zero, ratio) for ratio in range(len(RATIOS))])
+    return -log2(tables / tables.sum(axis=1, keepdims=True))
 
 
 def _bounds(token: int) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.tokens import MAX_TOKENS, TABLE_TOTAL
 from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.elementary import log2
 
 TOTALS = (64, 256, 1024, TABLE_TOTAL)  # that are tried, beside the counts themselves
 
@@ -39,7 +40,7 @@ def read_tables(cursor: Cursor, n_contexts: int) -> list[Int64]:
 def bits_of(counts: Int64, table: Int64) -> float:
     """Bits that tokens of these ``counts (n,)`` take under frequencies ``table (n,)``."""
     used = counts > 0
-    return float(-(counts[used] * np.log2(table[used] / max(1, int(table.sum())))).sum())
+    return float(-(counts[used] * log2(table[used] / max(1, int(table.sum())))).sum())
 
 
 def _describe(counts: Int64) -> tuple[bytes, Int64]:

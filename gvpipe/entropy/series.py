@@ -14,6 +14,7 @@ import numpy as np
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.elementary import log2
 
 MAX_CLASS = 63
 FIRST_CLASS = 63  # of the first frame's differences, where these have a context of their own
@@ -33,7 +34,7 @@ def encode_series(series: Int64, orders: tuple[int, ...], first_apart: bool = Fa
         first_apart: whether frame 0, which is large, has a context of its own.
     """
     candidates = np.stack([_difference(series, order) for order in orders])  # (orders, n, m)
-    choice = np.log2(1.0 + np.abs(candidates)).sum(axis=1).argmin(axis=0)
+    choice = log2(1.0 + np.abs(candidates)).sum(axis=1).argmin(axis=0)
     left = np.take_along_axis(candidates, choice[None, None], axis=0)[0]
     classes = _magnitude_classes(left, first_apart)
     head = (np.array(orders)[choice] << 6 | classes).astype(np.uint8)
@@ -71,7 +72,7 @@ def _magnitude_classes(series: Int64, first_apart: bool) -> Int64:
     counted = series[1:] if first_apart else series
     mean = np.abs(counted).mean(axis=0) if len(counted) else np.zeros(series.shape[1])
     most = FIRST_CLASS - 1 if first_apart else MAX_CLASS
-    return np.asarray(np.clip(np.rint(2 * np.log2(mean + 0.5) + 2), 0, most), np.int64)
+    return np.asarray(np.clip(np.rint(2 * log2(mean + 0.5) + 2), 0, most), np.int64)
 
 
 def _contexts(classes: Int64, shape: tuple[int, ...], first_apart: bool) -> Int64:

@@ -42,13 +42,13 @@ class VertexErrors:
 
     def add(self, a: Float64, distance: Float64) -> None:
         """Take frames ``a (n, V, 3)`` of the reference and their vertices' distances ``(n, V)``, model units."""
-        squared = np.einsum("fv,fv->f", distance, distance)
+        squared = np.square(distance).sum(axis=1)
         self._rmse.append(np.sqrt(squared / distance.shape[1]))
         self._mean.append(distance.mean(axis=1))
         self._largest.append(distance.max(axis=1))
         self._squared_error += float(squared.sum())
         centred = a - a.mean(axis=1, keepdims=True)
-        self._squared_spread += float(np.einsum("fvc,fvc->", centred, centred))
+        self._squared_spread += float(np.square(centred).sum())
 
     @property
     def rmse(self) -> Float64:
@@ -104,7 +104,7 @@ def measure_spread(sequence: MeshSequence) -> float:
 
 def frame_diagonal(reference: MeshSequence) -> float:
     """Diagonal of frame 0's bounding box, model units."""
-    return float(np.linalg.norm(np.ptp(reference.read_exact(0, 1)[0], axis=0)))
+    return float(np.sqrt(np.square(np.ptp(reference.read_exact(0, 1)[0], axis=0)).sum()))
 
 
 def ratio(value: float, size: float) -> float | None:

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from gvpipe.coding.quality_scale import fall_at, on_scale
+from gvpipe.foundation.elementary import log
 from gvpipe.foundation.errors import InputError
 from gvpipe.rate_control.targets import NAMES, Target
 from gvpipe.rate_control.trials import Trial
@@ -105,12 +106,12 @@ class _Goal:
     def value(self, trial: Trial) -> float:
         """Logarithm of the trial's measure over the middle of what is close enough; below 0 where quality is too low."""
         middle = self.target.value * math.sqrt(1 - TOLERANCE)
-        value = math.log(max(self.target.of(trial), LEAST_ERROR) / middle)
+        value = log(max(self.target.of(trial), LEAST_ERROR) / middle)
         return value if self.is_rate else -value
 
     def is_close(self, value: float) -> bool:
         """Whether the trial lies within the tolerance."""
-        return abs(value) <= -math.log(1 - TOLERANCE) / 2
+        return abs(value) <= -log(1 - TOLERANCE) / 2
 
 
 class _Bracket:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 from gvpipe.coding.codec import Codec, Memo
 from gvpipe.coding.registry import estimate_sequence
+from gvpipe.foundation.elementary import power
 from gvpipe.foundation.errors import InputError
 from gvpipe.foundation.progress import Progress
 from gvpipe.model.sequence import MeshSequence
@@ -29,7 +30,7 @@ ELASTICITY = 0.45  # bytes are about proportional to the error to minus this pow
 
 def at_error(n_bytes: float, error: float, wanted: float) -> float:
     """Bytes as if an encode left the error that is wanted, any unit."""
-    return n_bytes * (error / wanted) ** ELASTICITY if error > 0 and wanted > 0 else float(n_bytes)
+    return n_bytes * power(error / wanted, ELASTICITY) if error > 0 and wanted > 0 else float(n_bytes)
 
 
 class SizeEstimates:

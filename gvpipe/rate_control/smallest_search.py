@@ -6,11 +6,11 @@ sizes, the middle one least, predicts it; their logarithms are nearer to a parab
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 from gvpipe.coding.quality_scale import BELOW, on_scale
+from gvpipe.foundation.elementary import log
 from gvpipe.rate_control.trials import Trial
 
 MOST_ENCODES = 8
@@ -35,12 +35,12 @@ def find_smallest(attempt: Callable[[float], Trial], bound: float, start: float)
     """
     tried = [attempt(start)]
     rmse = tried[0].errors.rmse
-    second = on_scale(start + _limited(math.log(BOUND_RATIO * rmse / bound) / BELOW)) if rmse > 0 else start
+    second = on_scale(start + _limited(log(BOUND_RATIO * rmse / bound) / BELOW)) if rmse > 0 else start
     if second != start:  # there the rmse is a usual part of the bound
         tried.append(attempt(second))
     step = FIRST_STEP
     while len(tried) < MOST_ENCODES:
-        points = sorted(_Point(trial.codec.quality, math.log(trial.bytes)) for trial in tried)
+        points = sorted(_Point(trial.codec.quality, log(trial.bytes)) for trial in tried)
         quality = _next_quality(points, step)
         if quality is None:
             break

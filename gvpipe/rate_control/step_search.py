@@ -17,6 +17,7 @@ import numpy as np
 
 from gvpipe.coding.codec import Encoded, FrameReader
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.foundation.elementary import exp, log
 from gvpipe.model.sequence import MeshSequence
 
 CLOSE_ENOUGH = 0.9, 1.06  # part of the target error, for codecs whose errors scatter by a few percent
@@ -65,7 +66,7 @@ class Anchor:
 
     def distance(self, target_error: float) -> float:
         """How far a target error, model units, is from the error measured, as a logarithm."""
-        return math.log(target_error) - math.log(self.error)
+        return log(target_error) - log(self.error)
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Flat:
         """From two steps and the errors that they left, model units; None where errors follow steps, or fall."""
         (step, error), (other, other_error) = before, after
         factor = (other_error**2 - error**2) / (other**2 - step**2)
-        if not factor > 0 or math.log(other_error / error) / math.log(other / step) >= FLAT_SLOPE:
+        if not factor > 0 or log(other_error / error) / log(other / step) >= FLAT_SLOPE:
             return None
         return cls(math.sqrt(max(error**2 - factor * step**2, 0.0)), factor)
 
@@ -187,7 +188,7 @@ class StepSearch:
                 return measured[-1]
             measured = measured[:-1]
         useful = [one for one in measured if one[1] <= self.goal.most * self.goal.target_error] or measured
-        return min(reversed(useful), key=lambda one: abs(math.log(one[1]) - math.log(self.goal.middle)))
+        return min(reversed(useful), key=lambda one: abs(log(one[1]) - log(self.goal.middle)))
 
     def _is_coarsest(self) -> bool:
         """Whether the last step rounded everything to 0."""
@@ -200,7 +201,7 @@ class StepSearch:
         (step, error), (other, other_error) = self._measured[-2:]
         if not other > step or other_error >= self.goal.close_enough[0] * self.goal.target_error:
             return False
-        return last or math.log(other_error / error) < FLAT_SLOPE * math.log(other / step)
+        return last or log(other_error / error) < FLAT_SLOPE * log(other / step)
 
     def _is_dearer(self) -> bool:
         """Whether a larger step cost more, where errors hardly follow steps and the one before was fine enough."""
@@ -248,8 +249,8 @@ def step_between(anchors: Sequence[Anchor], target_error: float) -> float | None
     ordered = sorted(anchors, key=lambda anchor: anchor.error)
     for low, high in pairwise(ordered):
         if low.error <= target_error < high.error:
-            part = math.log(target_error / low.error) / math.log(high.error / low.error)
-            return low.step * math.exp(part * math.log(high.step / low.step))
+            part = log(target_error / low.error) / log(high.error / low.error)
+            return low.step * exp(part * log(high.step / low.step))
     near = nearest(anchors, target_error)
     return (
         near.step * target_error / near.error
@@ -281,11 +282,11 @@ def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
 
 def _slope_between(before: tuple[float, float], after: tuple[float, float]) -> float:
     """The slope of log(error) over log(step) between two ``(step, error)``, kept within `SLOPES`."""
-    slope = math.log(after[1] / before[1]) / math.log(after[0] / before[0])
+    slope = log(after[1] / before[1]) / log(after[0] / before[0])
     return min(max(slope, SLOPES[0]), SLOPES[1])
 
 
 def _change(error: float, target_error: float, slope: float) -> float:
     """What to multiply a step by, so that it leaves the target error."""
-    change, most = (math.log(target_error) - math.log(error)) / slope, math.log(MOST_CHANGE)
-    return math.exp(min(max(change, -most), most))
+    change, most = (log(target_error) - log(error)) / slope, log(MOST_CHANGE)
+    return exp(min(max(change, -most), most))

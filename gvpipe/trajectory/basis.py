@@ -30,8 +30,9 @@ from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Float64, Floats, Int64
 from gvpipe.foundation.budget import UNLIMITED, Budget
+from gvpipe.foundation.elementary import exp2, log, log2
 from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
-from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
+from gvpipe.trajectory.gram import descending_eigenvectors, gram_of_columns, is_tall, product, smaller_gram
 from gvpipe.trajectory.temporal_neighbours import temporal_order
 
 THRESHOLD = 0.2
@@ -139,7 +140,7 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
     tall = is_tall(trajectories)
     if tall:  # by blocks: a copy of a million vertices' trajectories is large
         blocks = (trajectories[rows] - mean for rows in row_blocks(len(trajectories)))
-        gram = np.sum([block.T @ block for block in blocks], axis=0)
+        gram = np.sum([gram_of_columns(block) for block in blocks], axis=0)
     else:
         gram = smaller_gram(trajectories - mean)
     total = float(np.trace(gram))
@@ -148,7 +149,7 @@ def find_principal(trajectories: Float64, error: float) -> Principal:
         return Principal(mean, np.zeros(0), np.zeros((len(mean), 0)), total)
     energies, vectors = descending_eigenvectors(gram, least)
     if not tall:
-        vectors = ((trajectories - mean).T @ vectors) / np.sqrt(energies)
+        vectors = product((trajectories - mean).T, vectors) / np.sqrt(energies)
     return Principal(mean, energies, np.ascontiguousarray(vectors), max(0.0, total - float(energies.sum())))
 
 
@@ -186,9 +187,9 @@ def choose_step(principal: Principal, error: float, count: Callable[[float], int
         return expected_error(principal, n_kept, step, left) <= error
 
     jump = _coarsest(lambda step: is_met(step, count(step)))
-    counts = {count(jump), count(jump * 2 ** (1 / PER_STEP_OCTAVE))}
+    counts = {count(jump), count(jump * exp2(1 / PER_STEP_OCTAVE))}
     choices = [(_coarsest(functools.partial(is_met, n_kept=n)), n) for n in sorted(counts)]
-    return min(choices, key=lambda choice: abs(math.log(choice[0] / jump)))
+    return min(choices, key=lambda choice: abs(log(choice[0] / jump)))
 
 
 def _coarsest(is_fine: Callable[[float], bool]) -> float:
@@ -196,11 +197,11 @@ def _coarsest(is_fine: Callable[[float], bool]) -> float:
     low, high = -PER_STEP_OCTAVE * 130, PER_STEP_OCTAVE * 128  # float32 positions reach 2**128
     while high - low > 1:
         middle = (low + high) // 2
-        if is_fine(2.0 ** (middle / PER_STEP_OCTAVE)):
+        if is_fine(exp2(middle / PER_STEP_OCTAVE)):
             low = middle
         else:
             high = middle
-    return float(2.0 ** (low / PER_STEP_OCTAVE))
+    return exp2(low / PER_STEP_OCTAVE)
 
 
 def encode_basis(
@@ -210,7 +211,7 @@ def encode_basis(
 
     ``penalty`` is that of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
     """
-    levels = np.rint(PER_OCTAVE * np.log2(np.sqrt(principal.energies[:n_components]) / step)).astype(np.int64)
+    levels = np.rint(PER_OCTAVE * log2(np.sqrt(principal.energies[:n_components]) / step)).astype(np.int64)
     levels = np.clip(levels, -MAX_SCALE, MAX_SCALE)
     scales = _scales(levels, n_points, step)
     columns = np.column_stack([principal.mean, principal.vectors[:, :n_components]]) * scales  # (3F, 1 + R)
@@ -257,27 +258,28 @@ def decode_basis(
 
 def fit_coefficients(trajectories: Float64, basis: Basis) -> Float64:
     """Return the coefficients ``(V, R)`` that bring ``trajectories (V, 3F)`` closest, given the decoded basis."""
-    from scipy.linalg import cho_factor, cho_solve
+    from gvpipe.trajectory.product_kernels import solve_definite
 
     if not basis.vectors.shape[1]:
         return np.zeros((len(trajectories), 0))
-    gram = basis.vectors.T @ basis.vectors
+    gram = gram_of_columns(basis.vectors)
     gram[np.diag_indices_from(gram)] *= 1 + RIDGE
     gram[np.diag_indices_from(gram)] += LEAST
-    factor = cho_factor(gram)
-    fitted = np.empty((len(trajectories), len(gram)))
+    turned, fitted = basis.vectors.T, np.empty((len(trajectories), len(gram)))
     for rows in row_blocks(len(trajectories)):  # as many copies of a million vertices' coefficients would be large
-        fitted[rows] = cho_solve(factor, ((trajectories[rows] - basis.mean) @ basis.vectors).T).T
+        right = product(turned, (trajectories[rows] - basis.mean).T)
+        solve_definite(gram.copy(), right)
+        fitted[rows] = right.T
     return fitted
 
 
 def squared_errors(trajectories: Floats, basis: Basis, coefficients: Float64) -> Float64:
     """Squared errors ``(V,)``, summed over frames, of ``trajectories (V, 3F)`` from a basis and ``coefficients (V, R)``."""
-    result = np.empty(len(trajectories))
+    result, turned = np.empty(len(trajectories)), np.ascontiguousarray(basis.vectors.T)
     for first in range(0, len(result), BLOCK):
         block = slice(first, first + BLOCK)
-        left = trajectories[block] - basis.mean - coefficients[block] @ basis.vectors.T
-        result[block] = np.einsum("vf,vf->v", left, left)
+        left = trajectories[block] - basis.mean - product(coefficients[block], turned)
+        result[block] = np.square(left).sum(axis=1)
     return result
 
 

@@ -81,5 +81,5 @@ def sum_squared_errors(
         part = Basis(basis.mean[axes], basis.vectors[axes])
         for points in row_blocks(len(members)):
             trajectories = block[:, members[points]].swapaxes(0, 1).reshape(-1, 3 * len(block))
-            total += float(squared_errors(trajectories, part, coefficients[points]) @ copies[points])
+            total += float((squared_errors(trajectories, part, coefficients[points]) * copies[points]).sum())
     return total

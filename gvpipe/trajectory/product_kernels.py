@@ -192,6 +192,21 @@ def multiply(matrix: Rows, vectors: Float64) -> Float64:
 
 
 @compiled
+def multiply_blocks(blocks: Float64, rows: Float64) -> Float64:
+    """The products ``(K, r, m)`` of many small matrices ``(K, r, c)`` with as many others ``(K, c, m)``."""
+    n_blocks, n_rows, n_terms = blocks.shape
+    result = np.zeros((n_blocks, n_rows, rows.shape[2]))
+    for k in range(n_blocks):
+        for r in range(n_rows):
+            sums = result[k][r]
+            for t in range(n_terms):
+                weight, row = blocks[k, r, t], rows[k][t]
+                for c in range(len(sums)):
+                    sums[c] += weight * row[c]
+    return result
+
+
+@compiled
 def solve_definite(matrix: Float64, right: Float64) -> None:
     """Turn right-hand sides ``(n, m)`` of a symmetric, positive definite ``matrix (n, n)`` into solutions; it is destroyed."""
     n = len(matrix)

@@ -16,6 +16,7 @@ import numpy as np
 
 from gvpipe.entropy.tokens import N_EXTRA, tokenise
 from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors
@@ -54,5 +55,5 @@ def _prices() -> Float64:
     """Bits ``(54, N_PRICED)`` of magnitudes of k in each context, the sign counted."""
     tables = first_tables()
     tokens, _, _ = tokenise(np.arange(N_PRICED))
-    bits = np.log2(tables.sum(axis=1, keepdims=True)) - np.log2(tables[:, tokens]) + N_EXTRA[tokens]
+    bits = log2(tables.sum(axis=1, keepdims=True)) - log2(tables[:, tokens]) + N_EXTRA[tokens]
     return np.asarray(np.rint(PRICE_ONE * bits) / PRICE_ONE)

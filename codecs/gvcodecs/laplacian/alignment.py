@@ -1,7 +1,4 @@
-"""Rigid alignment of points that correspond: turning groups of them so that they come closest to given ones (Kabsch).
-
-W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
-"""
+"""Rigid alignment of points that correspond: turning groups of them so that they come closest to given ones."""
 
 from __future__ import annotations
 
@@ -39,12 +36,13 @@ class Groups:
         turns = np.broadcast_to(np.eye(3), (len(frames), len(self.sizes), 3, 3)).copy()
         solid = self.sizes >= 3
         turns[:, solid] = rotations(self.total(offsets[..., :, None] * wanted[:, None, :])[:, solid])
-        turned: Float64 = np.einsum("nvi,nvij->nvj", offsets, turns[:, self.labels]) + centres
-        return turned
+        own = turns[:, self.labels]  # (n, V, 3, 3)
+        x, y, z = (offsets[..., i, None] * own[..., i, :] for i in range(3))
+        return np.asarray(x + y + z + centres)
 
 
 def rotations(covariances: Float64) -> Float64:
     """The rotations ``(..., 3, 3)`` R that make ``x @ R`` closest to y, given sums of x outer y."""
-    u, _, v = np.linalg.svd(covariances)
-    u[..., :, 2] *= np.where(np.linalg.det(u @ v) < 0, -1.0, 1.0)[..., None]
-    return np.asarray(u @ v, dtype=np.float64)
+    from gvcodecs.laplacian.alignment_kernels import find_rotations
+
+    return find_rotations(np.ascontiguousarray(covariances.reshape(-1, 3, 3))).reshape(covariances.shape)

@@ -24,6 +24,7 @@ from gvcodecs.laplacian.shape_fit import fit_shape
 from gvpipe.foundation.arrays import Float64, Int32
 from gvpipe.mesh.topology import adjacency, components
 from gvpipe.model.sequence import MeshSequence
+from gvpipe.trajectory.gram import product
 
 BLOCK = 8  # frames aligned at a time, to the mean of those before
 ALIGNED = 64  # frames aligned at most, evenly spread: they give no more than a start
@@ -67,6 +68,5 @@ def _place(points: Float64, mean: Float64, faces: Int32) -> Float64:
     side_b, side_c = (mean[faces[:, i]] - mean[faces[:, 0]] for i in (1, 2))
     reference = faces[np.argmax(np.linalg.norm(np.cross(side_b, side_c), axis=1))]
     centre, wanted = points[reference].mean(axis=0), mean[reference].mean(axis=0)
-    turn = rotations((points[reference] - centre).T @ (mean[reference] - wanted))
-    placed: Float64 = (points - centre) @ turn + wanted
-    return placed
+    turn = rotations(product((points[reference] - centre).T, mean[reference] - wanted))
+    return np.asarray(product(points - centre, turn) + wanted)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.foundation.arrays import Float32, Float64, Int32
+from gvpipe.foundation.elementary import arctan2
 from gvpipe.mesh.topology import unique_edges
 
 
@@ -57,7 +58,7 @@ class EdgeShapeSum:
         """Return the averages."""
         cosines, sines, trust = self._votes.T
         lengths = self._lengths / self._n_frames
-        return EdgeShape(self._edges, lengths, self._hinges, np.arctan2(sines, cosines), trust / self._n_frames)
+        return EdgeShape(self._edges, lengths, self._hinges, arctan2(sines, cosines), trust / self._n_frames)
 
 
 def find_hinges(faces: Int32) -> Int32:

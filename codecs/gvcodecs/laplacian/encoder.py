@@ -195,7 +195,7 @@ class _Start:
         """Squared error of the still points' vertices, summed over all frames, squared model units."""
         flags = self.still.flags
         off = sequence.read(0, 1)[0, self.shared.members[flags]].astype(np.float64) - self.still.positions[flags]
-        return sequence.n_frames * float(np.square(off).sum(axis=1) @ self.copies[flags])
+        return sequence.n_frames * float((np.square(off).sum(axis=1) * self.copies[flags]).sum())
 
 
 class _Segments(NamedTuple):

@@ -83,10 +83,10 @@ class ExtendedLaplacian:
         direction, last = np.zeros_like(anchored), np.ones(anchored.shape[1])
         for _ in range(FITTING_STEPS):
             gradient = self._gather(missing) * self._is_free[:, None]
-            slope = np.einsum("ar,ar->r", gradient, gradient)
+            slope = np.square(gradient).sum(axis=0)
             direction = gradient + direction * (slope / np.maximum(last, TINY))
             moved = self._spread(direction)
-            length = slope / np.maximum(np.einsum("pr,pr->r", moved, moved), TINY)
+            length = slope / np.maximum(np.square(moved).sum(axis=0), TINY)
             anchored = anchored + length * direction
             missing -= length * moved
             last = slope

@@ -2,8 +2,8 @@
 
 What is made small is the sum over edges of squared relative length errors, plus BENDING times the sum over hinges of squared
 angle errors, weighted with the trust in each angle. Levenberg-Marquardt: each step solves the sparse normal equations anew
-(3 unknowns per vertex; faces that share an edge couple their vertices), of small meshes by factors, of others by conjugate
-gradients, whose time and memory grow no faster than the mesh. The damping also holds what edge shapes leave open: the place and
+(3 unknowns per vertex; faces that share an edge couple their vertices) by conjugate gradients, whose time and memory grow no
+faster than the mesh. The damping also holds what edge shapes leave open: the place and
 the turn of each component.
 
 Source: Froehlich and Botsch, "Example-driven deformations based on discrete shells", 2011, for the least squares. The codec's
@@ -20,12 +20,13 @@ from scipy import sparse
 from gvcodecs.laplacian.edge_shape import EdgeShape
 from gvcodecs.laplacian.vectors import dot
 from gvpipe.foundation.arrays import Float64, Integers
+from gvpipe.foundation.elementary import arctan2
+from gvpipe.trajectory.sparse_rows import as_rows
 
 BENDING = 0.1  # squared relative length error that a squared radian weighs as much as
 SHORTEST = 2e-2  # least length that divides, in mean edge lengths
 FLATTEST = 1e-2  # least height over edge of a face that divides
 MAX_STEPS = 3  # solutions, which take nearly all of the time; more save the codec no bits
-FACTORED = 1 << 12  # vertices, at most, whose normal equations are factored: of 10,000 that takes 1.4 s and 450 MB each time
 GRADIENTS = 200  # of conjugate gradients: fewer cost the codec bits, more save none
 CLOSE = 1e-8  # part of the right side: solved
 GAIN = 0.02  # part of its squared error by which a component must still improve for another step to follow
@@ -57,10 +58,7 @@ def fit_shape(shape: EdgeShape, start: Float64, labels: Integers) -> Float64:
     state = _measure(shape, unit, start / unit)
     energy = np.bincount(label_of_error, state.errors**2, n_components)
     for _ in range(MAX_STEPS):
-        transposed = state.jacobian.T.tocsr()
-        normal = transposed @ state.jacobian
-        damped = normal + sparse.diags_array(np.repeat(damping[labels], 3) * normal.diagonal() + LEAST)
-        moved = state.points - _solve(sparse.csc_array(damped), transposed @ state.errors).reshape(-1, 3)
+        moved = state.points - _solve(state, np.repeat(damping[labels], 3)).reshape(-1, 3)
         tried = np.bincount(label_of_error, _measure(shape, unit, moved).errors ** 2, n_components)
         better = tried < energy
         unsettled = float(energy[~better | (tried < (1 - GAIN) * energy)].sum())
@@ -72,17 +70,13 @@ def fit_shape(shape: EdgeShape, start: Float64, labels: Integers) -> Float64:
     return state.points * unit
 
 
-def _solve(normal: sparse.csc_array, right: Float64) -> Float64:
-    """Solve the normal equations ``(3V, 3V)``, those of large meshes roughly."""
-    from scipy.sparse.linalg import LinearOperator, cg, splu
+def _solve(state: _State, damping: Float64) -> Float64:
+    """Solve the normal equations ``(3V, 3V)`` roughly; ``damping (3V,)`` is in diagonal entries."""
+    from gvcodecs.laplacian.gradient_kernels import solve_damped
 
-    if len(right) <= 3 * FACTORED:
-        options = {"SymmetricMode": True}
-        return np.asarray(splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve(right))
-    scale = 1 / normal.diagonal()
-    scaled = LinearOperator(normal.shape, matvec=lambda vector: scale * vector, dtype=right.dtype)
-    rows = sparse.csr_array((normal.data, normal.indices, normal.indptr), shape=normal.shape)  # it is symmetric
-    return np.asarray(cg(rows, right, rtol=CLOSE, maxiter=GRADIENTS, M=scaled)[0])
+    jacobian = state.jacobian
+    diagonal = np.bincount(jacobian.indices, jacobian.data**2, jacobian.shape[1])
+    return solve_damped(as_rows(jacobian), damping * diagonal + LEAST, state.errors, CLOSE, GRADIENTS)
 
 
 def _measure(shape: EdgeShape, unit: float, points: Float64) -> _State:
@@ -115,7 +109,7 @@ def _angle_errors(shape: EdgeShape, points: Float64) -> tuple[Float64, Float64]:
     normal_one, normal_other = np.cross(edge, one), np.cross(other, edge)  # twice the area long
     squared = np.maximum(dot(edge, edge), SHORTEST**2)
     length = np.sqrt(squared)
-    angle = np.arctan2(dot(normal_one, other) * length, dot(normal_one, normal_other))
+    angle = arctan2(dot(normal_one, other) * length, dot(normal_one, normal_other))
     weight = np.sqrt(BENDING) * shape.trust
     error = np.remainder(angle - shape.angles + np.pi, 2 * np.pi) - np.pi
     least = (FLATTEST * squared) ** 2

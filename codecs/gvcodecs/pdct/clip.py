@@ -41,6 +41,7 @@ from gvpipe.foundation.arrays import Float32, Float64, Int64
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import InputError
 from gvpipe.mesh.lattice import Lattice
+from gvpipe.trajectory.gram import gram_of_columns, product
 
 HEAD = struct.Struct("<6d")
 MAX_CLUSTERS = 1024
@@ -212,7 +213,11 @@ def _choose(coefficients: Float64, contexts: Int64, costs: Float64, n_affine: in
 
 def _projection(shapes: Float64) -> Float64:
     """The matrix ``(4, n)`` that fits the functions ``shapes (4, n)``."""
-    return np.asarray(np.linalg.solve(shapes @ shapes.T + RIDGE * np.eye(4), shapes))
+    from gvpipe.trajectory.product_kernels import solve_definite
+
+    result = shapes.copy()
+    solve_definite(gram_of_columns(shapes.T) + RIDGE * np.eye(4), result)
+    return result
 
 
 def _project(signals: Float64, projections: Float64, bounds: Int64) -> Float64:
@@ -228,5 +233,5 @@ def _expand(coefficients: Float64, shapes: Float64, sizes: Int64) -> Float64:
     result = np.empty((3, shapes.shape[1]))
     bounds = np.concatenate([[0], np.cumsum(sizes)])
     for k, (start, stop) in enumerate(pairwise(bounds)):
-        result[:, start:stop] = np.einsum("aj,jn->an", coefficients[:, 4 * k : 4 * k + 4], shapes[:, start:stop])
+        result[:, start:stop] = product(coefficients[:, 4 * k : 4 * k + 4], shapes[:, start:stop])
     return result

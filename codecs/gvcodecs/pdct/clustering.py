@@ -76,14 +76,24 @@ def cluster(sampled: Float32, seeds: Int64) -> Int64:
     labels = np.empty(sampled.shape[1], np.int64)
     for first in range(0, len(labels), BLOCK):
         block = sampled[:, first : first + BLOCK].astype(np.float64)
-        # |T_f (p_f - o_f) - T_g (p_g - o_g)|^2, summed; one product per seed carries all frames
+        # |T_f (p_f - o_f) - T_g (p_g - o_g)|^2, summed
         motion = np.empty((len(seeds), block.shape[1]))
         for k in range(len(seeds)):
-            local = (block - origins[:, k, None]) @ axes[:, k].swapaxes(1, 2)
-            moved = local[1:] - local[:-1]
-            motion[k] = np.einsum("nvi,nvi->v", moved, moved)
+            away, turn = block - origins[:, k, None], axes[:, k, :, None]  # (n, V, 3), and (n, 3, 1, 3)
+            axis_0, axis_1, axis_2 = (_along(away, turn[:, i]) for i in range(3))
+            motion[k] = _moved(axis_0) + _moved(axis_1) + _moved(axis_2)
         labels[first : first + BLOCK] = motion.argmin(axis=0)
     return labels
+
+
+def _along(vectors: Float64, axis: Float64) -> Float64:
+    """Coordinates ``(n, V)`` of ``vectors (n, V, 3)`` along an ``axis (n, 1, 3)``; terms have one order on every machine."""
+    return np.asarray(vectors[..., 0] * axis[..., 0] + vectors[..., 1] * axis[..., 1] + vectors[..., 2] * axis[..., 2])
+
+
+def _moved(coordinates: Float64) -> Float64:
+    """Squared differences of ``coordinates (n, V)`` from frame to frame, summed: ``(V,)``."""
+    return np.asarray(np.square(np.diff(coordinates, axis=0)).sum(axis=0))
 
 
 def _nearest(points: Float64, origins: Float64) -> Int64:
@@ -119,4 +129,4 @@ def _largest_triangle(sampled: Float32, faces: Int32) -> Int64:
 
 
 def _squared(vectors: Float64) -> Float64:
-    return np.asarray(np.einsum("vi,vi->v", vectors, vectors))
+    return np.asarray(np.square(vectors).sum(axis=1))

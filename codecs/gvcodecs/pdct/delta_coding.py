@@ -26,6 +26,7 @@ from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.range_decoder import start
 from gvpipe.entropy.tokens import model, tokenise
 from gvpipe.foundation.arrays import Float64, Int64, UInt8, UInt32
+from gvpipe.foundation.elementary import log2
 
 if TYPE_CHECKING:
     from gvcodecs.pdct.delta_kernels import Layout
@@ -67,7 +68,7 @@ class DeltaEncoder:
         from gvcodecs.pdct.delta_kernels import EXTRA_BITS
 
         counts = self._learning.counts
-        return np.asarray(np.log2(counts.sum(axis=1, keepdims=True) / counts) + EXTRA_BITS)
+        return np.asarray(log2(counts.sum(axis=1, keepdims=True) / counts) + EXTRA_BITS)
 
     def add_frame(self, contexts: Int64, values: Int64) -> None:
         """Code a frame: ``values (3, C)`` in ``contexts (3, C)``."""

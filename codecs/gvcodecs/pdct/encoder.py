@@ -281,4 +281,4 @@ def _code_clip(clips: _Clips, task: tuple[tuple[int, int], Clusters | None]) -> 
 def diagonal_of(frames: Float32) -> float:
     """The diagonal of the bounding box of ``frames (..., V, 3)``, model units."""
     points = frames.reshape(-1, 3)
-    return float(np.linalg.norm(points.max(axis=0).astype(np.float64) - points.min(axis=0)))
+    return float(np.sqrt(np.square(points.max(axis=0).astype(np.float64) - points.min(axis=0)).sum()))

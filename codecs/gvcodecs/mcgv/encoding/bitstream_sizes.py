@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from gvcodecs.mcgv.layout.chart_coding import SECTION as CHARTS
 from gvcodecs.mcgv.pictures.outliers import SECTION as OUTLIERS
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.foundation.elementary import power
 from gvpipe.rate_control.step_search import StepTrial
 
 POSTER = 1000  # bytes that stand in place of pictures, about
@@ -15,7 +14,7 @@ FALL = 0.2  # bytes of one blend go with the error to the power of about minus t
 
 def cost(trial: StepTrial, fall: float = FALL) -> float:
     """Bytes, as if at equal error: they go with the error to the power of minus ``fall``."""
-    return count_bytes(trial.bitstream) * math.pow(trial.error, fall)
+    return count_bytes(trial.bitstream) * power(trial.error, fall)
 
 
 def count_bytes(bitstream: Bitstream) -> int:

@@ -37,7 +37,7 @@ def measure_predicted(job: Job, start: Start, predict: Callable[[int, int], Floa
 
         def square(span: slice, block: Float32 = block, predicted: Float64 = predicted) -> float:
             off = block[:, vertices[span]] - predicted[:, points[span]]
-            return float(np.vdot(off, off))
+            return float(np.square(off).sum())
 
         total += sum(run_ahead(square, spans))
     return math.sqrt(total / (given.n_frames * given.n_vertices))

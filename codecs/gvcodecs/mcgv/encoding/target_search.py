@@ -10,8 +10,6 @@ What was measured (`CandidateAnchor`) serves encodes of the same sequence at oth
 
 from __future__ import annotations
 
-import math
-
 from gvcodecs.mcgv.base.base_frame import begin
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.bitstream_sizes import cost
@@ -22,6 +20,7 @@ from gvcodecs.mcgv.encoding.tuning import TUNING
 from gvcodecs.mcgv.encoding.without_pictures import approach, omit_pictures, refine
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
+from gvpipe.foundation.elementary import exp, log
 from gvpipe.metrics.vertex_errors import measure_spread
 from gvpipe.rate_control.step_search import COARSEST, SLOPE, Goal, StepTrial, find_step, nearest
 
@@ -82,7 +81,7 @@ def _fit_for_error(trials: StepTrials, step: float, target_error: float) -> tupl
     first = trials(step)
     if _lies_in(first.error / target_error, TUNING.keeps_blend):
         return trials, step
-    factor = _limited(math.log(TUNING.second_blend * target_error / max(first.error, TUNING.no_error * target_error)))
+    factor = _limited(log(TUNING.second_blend * target_error / max(first.error, TUNING.no_error * target_error)))
     others, other_step = _begin(trials.job, step * factor, target_error, 0.0)
     return (trials, step) if cost(first) < cost(others(other_step)) else (others, other_step)
 
@@ -98,8 +97,8 @@ def _coarsest(job: Job) -> float | None:
 
 def _limited(move: float) -> float:
     """The factor of a step whose logarithm moves by so much, or as far as it may at once."""
-    most = math.log(TUNING.most_change)
-    return math.exp(min(max(move, -most), most))
+    most = log(TUNING.most_change)
+    return exp(min(max(move, -most), most))
 
 
 def _lies_in(value: float, bounds: tuple[float, float]) -> bool:

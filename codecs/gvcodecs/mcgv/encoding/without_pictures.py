@@ -16,6 +16,7 @@ from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials
 from gvcodecs.mcgv.encoding.tuning import TUNING
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.foundation.elementary import power
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step
 
@@ -68,7 +69,7 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     blend_error = math.sqrt(max(trial.rest**2 - rounded**2, 0.0))
     if fine_error >= trial.error or blend_error > TUNING.hopeless * fine_error:
         return trial
-    step = trial.step * (fine_error / trial.error) ** (1 / SLOPE)
+    step = trial.step * power(fine_error / trial.error, 1 / SLOPE)
     finer = StepTrials(job, _smallest_base(job, candidate, step, fine_error))
     most = cost(trial, TUNING.fine_worth)
     if cost(finer(step), TUNING.fine_worth) > most:
@@ -108,7 +109,7 @@ def _are_pictures_dear(trials: StepTrials, step: float, target_error: float) -> 
         return False
     for _ in range(FINER):
         if trial.error > target_error:
-            trial = trials.alone(trial.step * (TUNING.bare_finer * target_error / trial.error) ** (1 / SLOPE))
+            trial = trials.alone(trial.step * power(TUNING.bare_finer * target_error / trial.error, 1 / SLOPE))
         if trial.error > TUNING.nearly * target_error:
             break
     return trial.error <= target_error

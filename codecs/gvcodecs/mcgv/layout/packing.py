@@ -19,6 +19,7 @@ from gvcodecs.mcgv.layout.chart_parameterization import Atlas
 from gvcodecs.mcgv.layout.kd_tree import cut
 from gvcodecs.mcgv.layout.layout import Layout
 from gvpipe.foundation.arrays import Bool, Float64, Int64
+from gvpipe.foundation.elementary import log2
 from gvpipe.foundation.errors import InputError
 
 FIT_ROUNDS = 8  # densities tried to fit a given image size
@@ -73,8 +74,8 @@ def _blocks(rectangle: Float64, n: int) -> Int64:
     """``(2,)`` columns and rows of blocks, at least n, for a chart of such sides: as few as go with as little stretch."""
     columns = np.arange(1, n + 1)
     rows = -(-n // columns)
-    stretch = np.abs(np.log(columns / rows) - np.log(rectangle[0] / rectangle[1]))
-    best = int((np.log(columns * rows) + stretch).argmin())
+    stretch = np.abs(log2(columns / rows) - log2(rectangle[0] / rectangle[1]))
+    best = int((log2(columns * rows) + stretch).argmin())
     return np.array([columns[best], rows[best]])
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from gvpipe.foundation.arrays import Float64, Floats, Int32
 from gvpipe.runtime.forks import kept
 from gvpipe.trajectory.basis import row_blocks
+from gvpipe.trajectory.gram import descending_eigenvectors, gram_of_columns, product
 
 ROWS = 1 << 14  # vertices whose products with all transforms are held at a time
 FLAT = 1e-4  # a cluster thinner than this part of its radius counts as flat: that direction stays unused
@@ -70,14 +71,14 @@ class AffinePredictor:
         moved = np.moveaxis(frames, 1, 0)[self._order].reshape(len(self._order), -1)  # (V, 3n), cluster after cluster
         for k, part in enumerate(self._slices):
             if part.stop > part.start:
-                still = np.tile(self._coordinates[part] @ self._rest[k], len(frames))
-                result[:, k] += (self._inverses[k] @ (moved[part] - still)).reshape(4, len(frames), 3).swapaxes(0, 1)
+                still = np.tile(product(self._coordinates[part], self._rest[k]), len(frames))
+                result[:, k] += product(self._inverses[k], moved[part] - still).reshape(4, len(frames), 3).swapaxes(0, 1)
         return result
 
     @kept
     def _inverses(self) -> list[Float64]:
         """Pseudo-inverses ``(4, m)`` of the clusters' coordinates."""
-        return [np.asarray(np.linalg.pinv(self._coordinates[part], rcond=FLAT)) for part in self._slices]
+        return [_invert(self._coordinates[part]) for part in self._slices]
 
     def predict(self, transforms: Float64) -> Float64:
         """Equation 3: ``(n, V, 3)`` predicted positions for ``transforms (n, K, 4, 3)``, model units."""
@@ -97,14 +98,14 @@ class AffinePredictor:
         """
         rows = transforms.transpose(1, 2, 0, 3).reshape(4 * self.n_clusters, -1)  # (4K, 3n)
         blocks = np.split(rows, self.n_clusters)
-        squares = [block @ block.T for block in blocks]
+        squares = [product(block, block.T) for block in blocks]
         errors = np.empty((frames.shape[1], self.n_clusters))
         for some in row_blocks(len(errors), ROWS):
             moved = np.moveaxis(frames[:, some], 1, 0).reshape(len(errors[some]), -1)  # (m, 3n)
-            products = (moved @ rows.T).reshape(len(moved), self.n_clusters, 4)
+            products = product(moved, rows.T).reshape(len(moved), self.n_clusters, 4)
             for k, square in enumerate(squares):
                 local = self._local(k, self._base[some])
-                errors[some, k] = ((local @ square - 2 * products[:, k]) * local).sum(axis=1)
+                errors[some, k] = ((product(local, square) - 2 * products[:, k]) * local).sum(axis=1)
             errors[some] += np.square(moved).sum(axis=1)[:, None]
         return np.asarray(np.maximum(errors, 0))
 
@@ -112,3 +113,11 @@ class AffinePredictor:
         """Homogeneous coordinates ``(m, 4)`` in the cluster's frame."""
         radius = self._frame[k, 3]
         return np.column_stack([(points - self._frame[k, :3]) / (radius if radius > 0 else 1.0), np.ones(len(points))])
+
+
+def _invert(coordinates: Float64) -> Float64:
+    """The pseudo-inverse ``(4, m)`` of a cluster's coordinates ``(m, 4)``, without directions in which they are flat."""
+    energies, vectors = descending_eigenvectors(gram_of_columns(coordinates))
+    used = energies > FLAT * FLAT * energies[0]
+    axes = vectors[:, used]
+    return product(axes / energies[used], product(axes.T, coordinates.T))

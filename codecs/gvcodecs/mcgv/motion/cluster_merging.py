@@ -15,6 +15,7 @@ import numpy as np
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
 from gvpipe.foundation.arrays import Float64, Int32, Int64
+from gvpipe.trajectory.gram import block_products
 
 PAIRS = 1 << 10  # whose errors are worked out at a time
 
@@ -63,7 +64,8 @@ def _added_errors(problem: Problem, trial: Trial, pairs: Int64) -> Float64:
         one, other = pairs[first : first + PAIRS].T
         apart = trial.transforms[one] - trial.transforms[other]
         half = invert_factors(energies[one] + energies[other])
-        moved = (half @ energies[one] @ apart) * (half @ energies[other] @ apart)
+        moved = block_products(block_products(half, energies[one]), apart)
+        moved *= block_products(block_products(half, energies[other]), apart)
         errors[first : first + PAIRS] = moved.sum(axis=(1, 2))
     return errors
 

@@ -11,8 +11,6 @@ the surface, stands for the points nearest to it, and is joined with those whose
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Iterator
 from itertools import islice
 from threading import Lock
 
@@ -21,12 +19,13 @@ from scipy import sparse
 
 from gvcodecs.mcgv.base.causal_neighbours import causal_neighbours
 from gvcodecs.mcgv.motion.blend_problem import Fitted, Problem, Trial, renumber
-from gvcodecs.mcgv.motion.segmentation import SEED, local_motions
+from gvcodecs.mcgv.motion.segmentation import draw_seeds, k_means, local_motions, nearest
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.mesh.topology import components, k_ring
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, smaller_gram
+from gvpipe.trajectory.basis import ROUNDING
+from gvpipe.trajectory.gram import descending_eigenvectors, is_tall, product, smaller_gram
 
 RING = 3  # order of the neighbourhood whose motion is a point's, as in `segmentation`
 FRAMES = 192  # frames, evenly spaced, that fitting looks at
@@ -41,7 +40,6 @@ BIT_WORTH = 0.14  # squared steps that a bit of the weights must save
 SAMPLES = 4000  # points that k-means sees
 K_MEANS_ROUNDS = 8
 NEGLIGIBLE = 0.1  # part of the noise of rounding to steps: motion below is left out
-TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
 BLOCK = 1 << 16  # points whose displacements are turned at a time
 
 
@@ -133,7 +131,7 @@ class SampledMotions:
             axes = self.coarse.axes[3 * k : 3 * k + 3, :n]
             for first in range(0, len(motions), BLOCK):
                 rows = slice(first, first + BLOCK)
-                motions[rows] += (frame[rows] - self._base[rows]) @ axes
+                motions[rows] += product(frame[rows] - self._base[rows], axes)
         part = len(few.base) / len(self._base)
         return Problem(self._base, motions, self._neighbours, few.price / math.sqrt(part), few.cluster_price / part)
 
@@ -151,9 +149,6 @@ def find_motions(sequence: MeshSequence, base: Float64, neighbours: sparse.csr_a
     return Motions(_displacements(sequence.sample(FRAMES), base), base, neighbours, sequence.n_frames)
 
 
-WARNINGS = Lock()  # what is ignored is a matter of the whole process
-
-
 class Clustering:
     """K-means of the points' motions for any number of clusters: the first K of one sequence of seeds start it."""
 
@@ -161,40 +156,18 @@ class Clustering:
         self._features = features
         self._sample = features[:: max(1, len(features) // SAMPLES)]
         self._seeds: list[int] = []
-        self._drawn, self._lock = _draw_seeds(self._sample), Lock()
+        self._drawn, self._lock = draw_seeds(self._sample), Lock()
 
     def start(self, n_clusters: int) -> Fitted:
         """Each point follows its own cluster alone, of at most ``n_clusters``."""
-        from scipy.cluster.vq import kmeans2, vq
-
         with self._lock:  # charts start from clusters beside the blend
             self._seeds += islice(self._drawn, max(0, n_clusters - len(self._seeds)))
             seeds = self._sample[self._seeds[:n_clusters]]
         clusters = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts = np.zeros((len(self._features), INFLUENCES), np.int32)
         parts[:, 0] = TOTAL
-        with WARNINGS, warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped
-            centres, _ = kmeans2(self._sample, seeds, iter=K_MEANS_ROUNDS, minit="matrix")
-        clusters[:, 0] = vq(self._features, centres)[0]
+        clusters[:, 0] = nearest(self._features, k_means(self._sample, seeds, K_MEANS_ROUNDS))
         return renumber(Weights(clusters, parts))
-
-
-def _draw_seeds(sample: Float64) -> Iterator[int]:
-    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++)."""
-    draw = np.random.default_rng(SEED)
-    squares = np.square(sample).sum(axis=1)
-    seeds = [int(squares.argmax())]
-    distance = np.full(len(sample), np.inf)
-    while True:
-        yield seeds[-1]
-        last = seeds[-1]
-        distance = np.minimum(distance, np.maximum(squares + squares[last] - 2 * (sample @ sample[last]), 0))
-        distance[seeds] = 0
-        total = np.cumsum(distance)
-        if not total[-1] > TINY * squares.sum():
-            return
-        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
 
 
 def _displacements(frames: Float64, base: Float64) -> Float64:
@@ -205,11 +178,13 @@ def _displacements(frames: Float64, base: Float64) -> Float64:
 def _principal(columns: Float64) -> tuple[Float64, Float64, Float64]:
     """Principal coordinates ``(P, n)`` of rows, the columns' energies, descending, and the axes ``(3F, n)``.
 
-    Nothing is subtracted first. The axes are those of a matrix that has as many rows as columns, at least.
+    Nothing is subtracted first. The axes are those of a matrix that has as many rows as columns, at least. What rounding makes
+    of components without energy is left out; one component stays in any case.
     """
-    energies, vectors = descending_eigenvectors(smaller_gram(columns))
-    energies = np.maximum(energies, 0.0)
-    coordinates = columns @ vectors if is_tall(columns) else vectors * np.sqrt(energies)
+    gram = smaller_gram(columns)
+    total = float(np.trace(gram))
+    energies, vectors = descending_eigenvectors(gram, ROUNDING * total) if total > 0 else (np.zeros(1), np.eye(len(gram), 1))
+    coordinates = product(columns, vectors) if is_tall(columns) else vectors * np.sqrt(energies)
     return np.ascontiguousarray(coordinates), energies, vectors
 
 

@@ -18,7 +18,7 @@ best, and refits, a few times. It lowers the residual by a tenth (cow) to a thir
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Iterator
 from itertools import islice
 
 import numpy as np
@@ -30,14 +30,22 @@ from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.mesh.topology import k_ring
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.trajectory.basis import row_blocks
-from gvpipe.trajectory.gram import descending_eigenvectors
+from gvpipe.trajectory.gram import (
+    block_products,
+    descending_eigenvectors,
+    gram_of_columns,
+    is_tall,
+    product,
+    smaller_gram,
+)
 
 RING = 3  # order of the neighbourhood, the paper's
 DIMENSIONS = 40  # principal coordinates of the motion vectors that k-means sees
-OVERSAMPLING = 10  # of the randomised range finder (Halko, Martinsson and Tropp 2011)
 RIDGE = 1e-6  # of the trace of a normal matrix: decides the directions that a flat neighbourhood leaves open
 RESTARTS = 4  # of k-means; the best is kept
 SEED = 2007
+TINY = 1e-12  # part of all squared motion: points closer than this to seeds are no seeds
+ROUNDS = 50  # of k-means
 REFINE_ROUNDS = 5
 REFINE_FRAMES = 160  # frames, evenly spaced, that refinement looks at
 REFINE_FLOATS = 12 << 20  # their coordinates held at a time
@@ -121,7 +129,7 @@ class LocalAffineFit:
         means = self._mean[:, :, None] * self._mean[:, None, :]
         spread = (ring @ outer).reshape(-1, 3, 3) - self._size[:, :, None] * means
         ridge = RIDGE * np.trace(spread, axis1=1, axis2=2) + 1e-12
-        self._inverse = np.linalg.inv(spread + ridge[:, None, None] * np.eye(3))
+        self._inverse = _inverses(spread + ridge[:, None, None] * np.eye(3))
 
     def motion(self, frames: Float64) -> Float64:
         """Return ``(R, n, 4, 3)`` for ``frames (n, P, 3)``: rows 0..2 the linear part less identity, row 3 the translation."""
@@ -136,8 +144,8 @@ class LocalAffineFit:
         linear = rows[:, :3]
         for i in range(3):
             linear[:, i] = self._ring @ (self._base[:, i, None] * shifts) - self._size * self._mean[:, i, None] * shift
-        linear[:] = self._inverse @ linear
-        rows[:, 3] = shift - np.einsum("pi,pim->pm", self._mean, linear)
+        linear[:] = block_products(self._inverse, linear)
+        rows[:, 3] = shift - block_products(self._mean[:, None], linear)[:, 0]
         return rows
 
 
@@ -160,9 +168,9 @@ def local_motions(base: Float64, ring: sparse.csr_array, columns: Float64) -> Fl
         return _principal_coordinates(rows)
     some = everyone[:: -(-len(base) // LARGE)]
     parts = (_motion_rows(unit, moved, ring, some[block]) for block in row_blocks(len(some), BLOCK))
-    axes = descending_eigenvectors(np.asarray(sum(rows.T @ rows for rows in parts)))[1][:, :DIMENSIONS]
+    axes = descending_eigenvectors(np.asarray(sum(map(gram_of_columns, parts))), most=DIMENSIONS)[1]
     blocks = row_blocks(len(base), BLOCK)
-    return np.concatenate([_motion_rows(unit, moved, ring, everyone[block]) @ axes for block in blocks])
+    return np.concatenate([product(_motion_rows(unit, moved, ring, everyone[block]), axes) for block in blocks])
 
 
 def _motion_rows(unit: Float64, moved: Float64, ring: sparse.csr_array, points: Int64) -> Float64:
@@ -191,31 +199,71 @@ def refine(sequence: MeshSequence, base: Float64, ring: sparse.csr_array, cluste
 
 
 def _principal_coordinates(rows: Float64) -> Float64:
-    """Rotate ``rows (P, n)`` to its leading `DIMENSIONS` principal axes, by a randomised range finder with one power step."""
-    if min(rows.shape) <= DIMENSIONS + OVERSAMPLING:
-        u, s, _ = np.linalg.svd(rows, full_matrices=False)
-        return np.asarray((u * s)[:, :DIMENSIONS])
-    probe = np.random.default_rng(SEED).standard_normal((rows.shape[1], DIMENSIONS + OVERSAMPLING))
-    turned = rows.T @ np.linalg.qr(rows @ probe)[0]  # (n, m): of the tall matrices only one is held at a time
-    basis = np.linalg.qr(rows @ turned)[0]
-    u, s, _ = np.linalg.svd(basis.T @ rows, full_matrices=False)
-    return np.asarray((basis @ (u * s))[:, :DIMENSIONS])
+    """Rotate ``rows (P, n)`` to its leading `DIMENSIONS` principal axes."""
+    energies, vectors = descending_eigenvectors(smaller_gram(rows), most=DIMENSIONS)
+    return product(rows, vectors) if is_tall(rows) else vectors * np.sqrt(np.maximum(energies, 0))
 
 
 def _k_means(features: Float64, n_clusters: int) -> Int32:
     """Labels ``(P,)``."""
-    from scipy.cluster.vq import kmeans2
-
     n_clusters = min(n_clusters, len(np.unique(np.round(features, 9), axis=0)))
-    best, best_cost = np.zeros(len(features), np.int32), np.inf
+    best, best_cost = np.zeros(len(features), np.int64), np.inf
     for restart in range(RESTARTS if n_clusters > 1 else 0):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # a cluster may run empty: it is dropped below
-            centres, labels = kmeans2(features, n_clusters, iter=50, minit="++", rng=np.random.default_rng(SEED + restart))
+        seeds = [*islice(draw_seeds(features, restart + 1), n_clusters)]
+        centres = k_means(features, features[seeds], ROUNDS)
+        labels = nearest(features, centres)
         cost = float(((features - centres[labels]) ** 2).sum())
         if cost < best_cost:
             best, best_cost = labels, cost
     return _relabel(best)
+
+
+def draw_seeds(sample: Float64, restart: int = 0) -> Iterator[int]:
+    """Yield rows of ``sample``, each drawn with the square of its distance from those before (k-means++).
+
+    The first is the longest one, or for a restart any.
+    """
+    draw = np.random.default_rng(SEED + restart)
+    squares = np.square(sample).sum(axis=1)
+    seeds, columns = [int(draw.integers(len(sample)) if restart else squares.argmax())], np.ascontiguousarray(sample.T)
+    distance = np.full(len(sample), np.inf)
+    while True:
+        yield seeds[-1]
+        last = seeds[-1]
+        distance = np.minimum(
+            distance, np.maximum(squares + squares[last] - 2 * product(sample[last : last + 1], columns)[0], 0)
+        )
+        distance[seeds] = 0
+        total = np.cumsum(distance)
+        if not total[-1] > TINY * squares.sum():
+            return
+        seeds.append(int(np.searchsorted(total, draw.random() * total[-1], side="right")))
+
+
+def k_means(sample: Float64, centres: Float64, rounds: int) -> Float64:
+    """Centres ``(K, n)`` after rounds of k-means over ``sample (m, n)``; one that no row is nearest to stays where it is."""
+    for _ in range(rounds):
+        labels = nearest(sample, centres)
+        counts = np.bincount(labels, minlength=len(centres))
+        sums = np.stack([np.bincount(labels, column, len(centres)) for column in sample.T], axis=1)
+        centres = np.where(counts[:, None] > 0, sums / np.maximum(counts, 1)[:, None], centres)
+    return centres
+
+
+def nearest(features: Float64, centres: Float64) -> Int64:
+    """The nearest of ``centres (K, n)`` for each row of ``features (P, n)``; of two as near, the first."""
+    columns, half = np.ascontiguousarray(centres.T), np.square(centres).sum(axis=1) / 2
+    blocks = row_blocks(len(features), BLOCK)
+    return np.concatenate([(half - product(features[rows], columns)).argmin(axis=1) for rows in blocks])
+
+
+def _inverses(matrices: Float64) -> Float64:
+    """Inverses ``(R, 3, 3)`` of symmetric matrices, by their adjugates."""
+    (a, b, c), (_, d, e), (*_, f) = np.moveaxis(matrices, 0, -1)
+    parts = [d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b]
+    determinant = a * parts[0] + b * parts[1] + c * parts[2]
+    adjugates = np.stack([parts[i] for i in (0, 1, 2, 1, 3, 4, 2, 4, 5)], axis=1).reshape(-1, 3, 3)
+    return np.asarray(adjugates / determinant[:, None, None])
 
 
 def _relabel(labels: Integers) -> Int32:

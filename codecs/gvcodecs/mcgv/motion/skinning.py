@@ -22,6 +22,8 @@ import numpy as np
 from scipy import sparse
 
 from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.trajectory.gram import block_products
+from gvpipe.trajectory.sparse_rows import as_rows
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
     from gvcodecs.mcgv.motion.cluster_system_kernels import NormalEquations
@@ -93,11 +95,14 @@ class BlendFit:
 
     def __init__(self, blend: Blend) -> None:
         self.matrix = blend.matrix()
+        self._turned = as_rows(self.matrix.T.tocsr())
         self._system = ClusterSystem(blend.normal_equations(np.zeros((self.matrix.shape[0], 0))), blend.inverse)
 
     def fit(self, motions: Float64) -> Float64:
         """``(4K, m)`` rows of equal weight that carry displacements ``(P, m)`` best."""
-        return self._system.solve(self.matrix.T @ motions)
+        from gvpipe.trajectory.product_kernels import multiply
+
+        return self._system.solve(multiply(self._turned, np.ascontiguousarray(motions)))
 
 
 class ClusterSystem:
@@ -139,8 +144,8 @@ def solve_normal(normal: NormalEquations) -> Float64:
     """Transforms ``(K, 4, m)`` that solve the normal equations, as `BlendFit` would."""
     n = len(normal.right)
     inverse = _whiten(normal.blocks[normal.rows == normal.columns])  # pairs are sorted
-    rows = ClusterSystem(normal, inverse).solve((inverse @ normal.right).reshape(4 * n, -1))
-    return np.ascontiguousarray(inverse.swapaxes(1, 2) @ rows.reshape(n, 4, -1))
+    rows = ClusterSystem(normal, inverse).solve(block_products(inverse, normal.right).reshape(4 * n, -1))
+    return block_products(inverse.swapaxes(1, 2), rows.reshape(n, 4, -1))
 
 
 def _whiten(energies: Float64) -> Float64:

@@ -20,7 +20,6 @@ come closer by this.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
@@ -35,6 +34,7 @@ from gvcodecs.mcgv.motion.segmentation import SEED
 from gvcodecs.mcgv.motion.skinning import TOTAL, Weights
 from gvcodecs.mcgv.motion.weight_coding import Prices, guess_prices, learn_prices
 from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.elementary import log, power
 from gvpipe.mesh.topology import k_ring
 
 if TYPE_CHECKING:
@@ -109,9 +109,9 @@ def _search(
             found = _find_number(problem, motions, start)
             best, start = _merge_clusters(problem, found), found.fitted
         left = motions.error(problem, best, step)
-        if not target_error or not left > 0 or abs(math.log(AIM * target_error / left)) < CLOSE:
+        if not target_error or not left > 0 or abs(log(AIM * target_error / left)) < CLOSE:
             break
-        step *= min(max((AIM * target_error / left) ** (1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
+        step *= min(max(power(AIM * target_error / left, 1 / SLOPE), 1 / MOST_MOVED), MOST_MOVED)
     if target_error and not n_clusters and not is_found:  # a fit for a step is an estimate, or the first of two
         best = _regrow(problem, best, 1)
     (last,) = _try_all(problem, [best], LAST_PASSES)

@@ -20,6 +20,7 @@ from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL, Weights
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Bool, Float64, Int64
+from gvpipe.foundation.elementary import exp2, log2
 
 if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
     from gvcodecs.mcgv.motion.weight_kernels import WeightNumbers
@@ -80,8 +81,8 @@ class Prices(NamedTuple):
 
 def guess_prices() -> Prices:
     """Prices before anything is coded."""
-    gap = 1 + 2 * np.log2(1 + np.arange(MAX_GAP + 1.0))
-    change = 2 + 1.5 * np.log2(1 + np.arange(float(TOTAL)))
+    gap = 1 + 2 * log2(1 + np.arange(MAX_GAP + 1.0))
+    change = 2 + 1.5 * log2(1 + np.arange(float(TOTAL)))
     return Prices(np.array([0.5, 3, 3, 3, 3]), np.tile(gap, (INFLUENCES, 1)), np.tile(change, (INFLUENCES, 1)))
 
 
@@ -91,16 +92,17 @@ def learn_prices(causal: CausalNeighbours, weights: Weights) -> Prices:
     _, own, changed = _used(numbers.counts)
     gap, change = [], []
     for j in range(INFLUENCES):
-        gap.append(_bits(np.minimum(numbers.gaps[own[:, j], j], MAX_GAP), 2.0 ** -guess.gaps[j]))
+        gap.append(_bits(np.minimum(numbers.gaps[own[:, j], j], MAX_GAP), guess.gaps[j]))
         magnitudes = np.abs(numbers.changes[changed[:, j], j])
-        change.append(_bits(magnitudes, 2.0 ** -guess.changes[j]) + (np.arange(TOTAL) > 0))  # the sign is a bit
-    return Prices(_bits(numbers.counts, 2.0**-guess.counts), np.array(gap), np.array(change))
+        change.append(_bits(magnitudes, guess.changes[j]) + (np.arange(TOTAL) > 0))  # the sign is a bit
+    return Prices(_bits(numbers.counts, guess.counts), np.array(gap), np.array(change))
 
 
-def _bits(values: Int64, prior: Float64) -> Float64:
-    """Bits of each value, by how often it occurs in ``values`` and by ``prior (n,)`` frequencies."""
+def _bits(values: Int64, guessed: Float64) -> Float64:
+    """Bits of each value, by how often it occurs in ``values`` and by how many ``guessed (n,)``."""
+    prior = np.array([exp2(-bits) for bits in guessed])
     frequencies = np.bincount(values, minlength=len(prior)) + 8 * prior / prior.sum()
-    return np.asarray(-np.log2(frequencies / frequencies.sum()))
+    return np.asarray(-log2(frequencies / frequencies.sum()))
 
 
 def _describe(weights: Weights, causal: CausalNeighbours) -> WeightNumbers:

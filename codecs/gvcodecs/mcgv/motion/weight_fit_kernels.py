@@ -15,6 +15,7 @@ import numpy as np
 from gvcodecs.mcgv.motion.skinning import INFLUENCES, TOTAL
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.runtime.compiled import compiled
+from gvpipe.trajectory.gram import product
 
 MAX_CANDIDATES = 10  # clusters that a fit considers
 LEAST_GAIN = 1e-3  # of the error: a further cluster must gain this much to be tried
@@ -70,10 +71,11 @@ def prepare(transforms: Float64) -> Transforms:
     """What fits read of ``transforms (K, 4, m)``."""
     n_clusters, _, n = transforms.shape
     flat = transforms.reshape(4 * n_clusters, n)
+    turned = flat.T
     products = np.empty((n_clusters * (n_clusters + 1) // 2, len(PAIRS)))
     for first in range(0, n_clusters, CLUSTERS_AT_ONCE):
         end = min(first + CLUSTERS_AT_ONCE, n_clusters)
-        blocks = (flat[4 * first : 4 * end] @ flat[: 4 * end].T).reshape(end - first, 4, end, 4).swapaxes(1, 2)
+        blocks = product(flat[4 * first : 4 * end], turned[:, : 4 * end]).reshape(end - first, 4, end, 4).swapaxes(1, 2)
         own = np.stack([blocks[..., r, s] + (blocks[..., s, r] if r < s else 0) for r, s in PAIRS], axis=2)
         for a in range(first, end):
             start = a * (a + 1) // 2

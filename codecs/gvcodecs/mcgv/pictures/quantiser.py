@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.elementary import exp2, log2
 from gvpipe.media.video import QP_RANGE, Profile
 
 QP_STEP = 0.625  # H.264's quantiser step at QP 0, levels of an orthonormal transform; it doubles every 6 QP
@@ -66,6 +67,6 @@ def choose_quantiser(effective: float, profile: Profile, magnitudes: Magnitudes)
         level = min(max(math.floor(wanted * (1 + 1e-9)), 1), JPEG_STEPS)
         return ImageQuantiser(level, finest * max(1.0, wanted / level))
     highest = QP_RANGE[1] + 6 * (profile.depth - 8)
-    level = math.floor(6 * math.log2(max(wanted, 1e-9) / QP_STEP))
+    level = math.floor(6 * float(log2(max(wanted, 1e-9) / QP_STEP)))
     level = min(max(level, QP_RANGE[0]), highest)
-    return ImageQuantiser(level, finest * max(1.0, wanted / (QP_STEP * 2 ** (level / 6))))
+    return ImageQuantiser(level, finest * max(1.0, wanted / (QP_STEP * exp2(level / 6))))
