@@ -123,7 +123,7 @@ def test_compare_json(run: Run, npz: Path, video: Path, sequence: MeshSequence) 
     same = one_object(run("compare", video, video, "--json").out)
     assert [same[key] for key in sorted(COMPARE_KEYS - {"frames", "hausdorff"})] == [0] * 7
     lines = run("compare", npz, video).out.splitlines()
-    listed = ("frames", "attributes", "fields", "metrics", "volume", "surface", "unpaired")
+    listed = ("frames", "attributes", "fields", "metrics", "volume", "surface", "unpaired", "textures")
     assert [line.split()[0] for line in lines] == [key for key in values if key not in listed]
 
 
