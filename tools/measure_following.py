@@ -167,7 +167,7 @@ def _decode_glb(coded: bytes) -> Mesh:
 
 
 def _seconds() -> float:
-    """Of processor time, with programs that were started."""
+    """Seconds of processor time, with programs that were started."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 

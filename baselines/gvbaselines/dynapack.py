@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gvbaselines.baseline import Baseline
-from gvbaselines.numbers import STEP, pack_origin, quantise, read_origin, read_step
+from gvbaselines.numbers import STEP, frame_contexts, pack_origin, quantise, read_origin, read_step
 from gvbaselines.parallelogram import traversal_of
 from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
@@ -75,7 +75,7 @@ class Dynapack(Baseline):
         points = quantise(frames - origin, step)
         residuals = np.zeros_like(points)
         _predict(points, residuals, traversal_of(mesh), self.predictor, decodes=False)
-        return head + STEP.pack(step) + encode_integers(residuals, _contexts(points.shape))
+        return head + STEP.pack(step) + encode_integers(residuals, frame_contexts(points.shape))
 
     @classmethod
     def decode_frames(cls, cursor: Cursor, settings: JsonObject, mesh: Topology, n_frames: int) -> Float64:
@@ -84,7 +84,7 @@ class Dynapack(Baseline):
         origin, step = read_origin(cursor), read_step(cursor)
         shape = (n_frames, mesh.n_points, 3)
         count = 3 * n_frames * mesh.n_points
-        residuals = decode_integers(cursor.rest(), count, _contexts(shape), cursor.name).reshape(shape)
+        residuals = decode_integers(cursor.rest(), count, frame_contexts(shape), cursor.name).reshape(shape)
         points = np.zeros(shape, np.int64)
         _predict(points, residuals, traversal_of(mesh), predictor, decodes=True)
         if points.size and not np.abs(points.astype(np.float64)).max() < MAX_POINT:
@@ -100,10 +100,3 @@ def _predict(points: Int64, residuals: Int64, traversal: Traversal, predictor: s
     for f in range(len(points)):
         kind = kinds[predictor] if f else kernels.SPACE
         kernels.predict_frame(points[f], points[max(f - 1, 0)], residuals[f], traversal, kind, decodes)
-
-
-def _contexts(shape: tuple[int, ...]) -> Int64:
-    """Frame 0 has a table of its own: its residuals are larger."""
-    contexts = np.ones(shape, np.int64)
-    contexts[0] = 0
-    return contexts

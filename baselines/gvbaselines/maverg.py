@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gvbaselines.baseline import Baseline
-from gvbaselines.numbers import STEP, pack_origin, quantise, read_origin, read_step
+from gvbaselines.numbers import STEP, frame_contexts, pack_origin, quantise, read_origin, read_step
 from gvbaselines.parallelogram import residuals_of, traversal_of, values_of
 from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
@@ -68,7 +68,7 @@ class Maverg(Baseline):
         residuals = np.zeros_like(points)
         residuals[0] = residuals_of(points[0], traversal_of(mesh))
         predict(points, residuals, causal_of(mesh, self.predictor), False)
-        return head + STEP.pack(step) + encode_integers(residuals, _contexts(points.shape))
+        return head + STEP.pack(step) + encode_integers(residuals, frame_contexts(points.shape))
 
     @classmethod
     def decode_frames(cls, cursor: Cursor, settings: JsonObject, mesh: Topology, n_frames: int) -> Float64:
@@ -78,7 +78,7 @@ class Maverg(Baseline):
         predictor = settings.choice("predictor", PREDICTORS)
         origin, step = read_origin(cursor), read_step(cursor)
         shape = (n_frames, mesh.n_points, 3)
-        residuals = decode_integers(cursor.rest(), int(np.prod(shape)), _contexts(shape), cursor.name).reshape(shape)
+        residuals = decode_integers(cursor.rest(), int(np.prod(shape)), frame_contexts(shape), cursor.name).reshape(shape)
         points = np.zeros(shape, np.int64)
         points[0] = values_of(residuals[0], traversal_of(mesh))
         predict(points, residuals, causal_of(mesh, predictor), True)
@@ -118,10 +118,3 @@ def _by_point(points: Int64, rows: Int64, n_points: int) -> tuple[Int64, Int64]:
     sorting = np.argsort(points, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(points, minlength=n_points))])
     return np.ascontiguousarray(rows[sorting]), np.asarray(starts, np.int64)
-
-
-def _contexts(shape: tuple[int, ...]) -> Int64:
-    """Frame 0 has a table of its own: its residuals are larger."""
-    contexts = np.ones(shape, np.int64)
-    contexts[0] = 0
-    return contexts

@@ -34,6 +34,13 @@ def multiples(numbers: Int64, step: float) -> Float64:
     return np.asarray(numbers * step, np.float64)
 
 
+def frame_contexts(shape: tuple[int, ...]) -> Int64:
+    """Contexts of residuals ``(n, P, 3)``: frame 0 has a table of its own, since its residuals are larger."""
+    contexts = np.ones(shape, np.int64)
+    contexts[0] = 0
+    return contexts
+
+
 def encode_columns(values: Int64) -> bytes:
     """Return the bytes of ``values (n, m)``.
 

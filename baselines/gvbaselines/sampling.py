@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from gvbaselines.square_map import SquareMap
-from gvpipe.foundation.arrays import Float64, Int64
+from gvpipe.foundation.arrays import Int64
 
 
 def sample_matrix(found: SquareMap, size: int, n_points: int) -> sparse.csr_array:
@@ -47,11 +47,6 @@ def round_places(found: SquareMap, n_points: int, one: int) -> Int64:
     result = np.zeros((n_points, 2), np.int64)
     result[found.disk.points[first]] = np.clip(np.rint(found.places[first] * one), 0, one).astype(np.int64)
     return result
-
-
-def through_images(values: Float64, sampled: sparse.csr_array, read: sparse.csr_array) -> Float64:
-    """What images without rounding give back of ``values (P, m)``."""
-    return np.asarray(read @ (sampled @ values))
 
 
 def _nearest_known(known: Int64, size: int) -> Int64:

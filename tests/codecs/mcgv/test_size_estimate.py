@@ -11,7 +11,7 @@ from gvpipe.coding.registry import encode_sequence, estimate_sequence
 
 
 def test_an_estimate_is_near_the_size() -> None:
-    """Of a blend alone, and of pictures of trajectories; published files have none."""
+    """Blends alone and pictures of trajectories have estimates; published files have none."""
     sequence, memo = waving(16, 30), Memo()
     for transform in ("none", "klt"):
         codec = Mcgv(quality=60.0, transform=transform, preset="ultrafast")

@@ -17,10 +17,9 @@ from gvcodecs.mcgv.encoding.step_trials import StepTrials
 from gvcodecs.mcgv.encoding.tuning import TUNING
 from gvpipe.coding.codec import Memo
 from gvpipe.coding.quality_scale import error_of
-from gvpipe.foundation.elementary import power
 from gvpipe.metrics.vertex_errors import measure_spread
+from gvpipe.rate_control.size_estimates import at_error
 
-ELASTICITY = 0.45  # bytes are about proportional to the error to minus this power
 PICTURED = 0.9  # times a blend alone, what pictures of trajectories take at least, about
 
 
@@ -53,4 +52,4 @@ def _first_blend(job: Job, target_error: float) -> tuple[Candidate, float]:
 def _bytes_at(job: Job, candidate: Candidate, target_error: float) -> float:
     """Bytes of one encode of a candidate, as if it left the target error."""
     trial = StepTrials(job, candidate)(candidate.start.step)
-    return count_bytes(trial.bitstream) * power(trial.error / target_error, ELASTICITY) if target_error else 0.0
+    return at_error(count_bytes(trial.bitstream), trial.error, target_error) if target_error else 0.0
