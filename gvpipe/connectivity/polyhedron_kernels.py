@@ -11,7 +11,7 @@ from gvpipe.foundation.arrays import Int64
 from gvpipe.runtime.compiled import compiled
 
 MOST_CANDIDATES = 48
-STEPS_PER_CORNER, STEPS_LEAST = 400, 1_000_000  # looks at open faces and edges that a grid may take
+STEPS_PER_CORNER, STEPS_LEAST = 400, 1 << 24  # looks at open faces and edges that a grid may take
 N_TYPES = 32
 TYPES, COUNTS, FACES, OTHER_FACES = 0, N_TYPES + 1, N_TYPES + 2, N_TYPES + 2 + 128  # first contexts
 TURNS, SIZES = OTHER_FACES + 2, OTHER_FACES + 2 + 32
@@ -169,9 +169,11 @@ def code_polyhedra(
             room = min(len(made.nodes) - corner_at, most - (corner_at - first_corner))
             place = (slot, count - 1 - slot, size, n_known, room)
             size = _code_face(coder, front, cell, place, wanted, (names, points), memory)
-            if size < 0:
+            if size < 0 or front.counts[2] > front.counts[3]:
                 return _given_up(coder, made, points)
             for i in range(size):
+                if front.counts[2] > front.counts[3]:
+                    return _given_up(coder, made, points)
                 made.nodes[corner_at + i] = cell.face[i]
                 cell.marks[cell.face[i]] = c + 1
                 _count_edge(front, cell, cell.face[i], cell.face[(i + 1) % size])
@@ -301,6 +303,8 @@ def _code_new_face(
     for i in range(size):
         if cell.face[i] >= 0:
             continue
+        if front.counts[2] > front.counts[3]:
+            return -1
         target = wanted[i] if coder.encodes else -1
         found = _code_point(coder, front, cell, i, target, renamed, memory)
         if found < 0:
@@ -394,11 +398,13 @@ def _near_faces(front: Open, cell: Cell, size: int, candidates: Int64, votes: In
 @compiled
 def _near_points(front: Open, cell: Cell, at: int, candidates: Int64, votes: Int64, n: int) -> int:
     """Points that may follow ``at`` around a face: along edges of the cell, and of open faces; -1: ends of the cell's edges."""
+    long = cell.about[2] >> 6  # a vote looks at all corners of the face
     for e in range(cell.about[0]):
         front.counts[2] += 1
         if cell.uses[e] != 1:
             continue
         a, b = cell.ends[e, 0], cell.ends[e, 1]
+        front.counts[2] += long
         if at < 0:
             n = _vote_point(cell, b, 1, candidates, votes, _vote_point(cell, a, 1, candidates, votes, n))
         elif at == a:
@@ -409,7 +415,7 @@ def _near_points(front: Open, cell: Cell, at: int, candidates: Int64, votes: Int
         return n
     here = front.heads[at]
     while here >= 0 and front.counts[2] <= front.counts[3]:
-        front.counts[2] += 1
+        front.counts[2] += 1 + long
         g, corner, here = front.owners[here], here, front.nexts[here]
         start, length = front.starts[g], front.starts[g + 1] - front.starts[g]
         for step in (1, length - 1):

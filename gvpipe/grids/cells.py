@@ -129,9 +129,10 @@ class Cells:
                 f"its {len(self.types)} cells have {len(self.offsets)} offsets up to {int(self.offsets[-1])}, "
                 f"but {len(self.nodes)} nodes"
             )
+        falls = self.offsets[1:] < self.offsets[:-1]  # no differences: those of hostile offsets wrap
+        if falls.any():
+            raise ValueError(f"the nodes of cell {int(np.argmax(falls))} end before they start")
         sizes = self.sizes
-        if sizes.min(initial=0) < 0:
-            raise ValueError(f"the nodes of cell {int(np.argmin(sizes))} end before they start")
         needed = SIZE_OF_TYPE[self.types]
         bad = np.flatnonzero((needed > 0) & (sizes != needed))
         if len(bad):

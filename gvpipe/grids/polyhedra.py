@@ -13,6 +13,7 @@ import numpy as np
 from gvpipe.foundation.arrays import Int64
 
 LEAST_CORNERS = 3
+MOST_SHARED, LEAST_SHARED = 8, 1 << 16  # of a list of faces: times its corners, or of so many
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Polyhedra:
     nodes: Int64
 
     def __post_init__(self) -> None:
-        if self.counts.min(initial=0) < 0 or self.counts.sum() != len(self.sizes) or self.sizes.sum() != len(self.nodes):
+        if not (_are_bounds(self.counts, len(self.sizes)) and _are_bounds(self.sizes, len(self.nodes))):
             raise ValueError(f"its {len(self.counts)} polyhedra have other numbers of faces or corners than they say")
         if self.sizes.min(initial=LEAST_CORNERS) < LEAST_CORNERS:
             raise ValueError(f"a polyhedron has a face with {self.sizes.min()} corners")
@@ -99,12 +100,14 @@ def from_faces(offsets: Int64, faces: Int64, face_offsets: Int64, nodes: Int64) 
         ValueError: bounds that fall or end elsewhere, a number that is no face's.
     """
     for bounds, end in ((offsets, len(faces)), (face_offsets, len(nodes))):
-        if not len(bounds) or bounds[0] < 0 or bounds[-1] > end or (np.diff(bounds) < 0).any():
+        if not len(bounds) or bounds[0] < 0 or bounds[-1] > end or (bounds[1:] < bounds[:-1]).any():  # differences may wrap
             raise ValueError("the bounds of its polyhedra's faces do not rise, or end elsewhere")
     if len(faces) and not 0 <= int(faces.min()) <= int(faces.max()) < len(face_offsets) - 1:
         raise ValueError("a polyhedron has a face that is not there")
     own = faces[offsets[0] : offsets[-1]]
     sizes = np.diff(face_offsets)[own]
+    if sizes.sum(dtype=np.float64) > MOST_SHARED * max(len(nodes), LEAST_SHARED):
+        raise ValueError("many of its polyhedra share large faces; at most two can have each")
     return Polyhedra(np.diff(offsets), sizes, nodes[ranges(face_offsets[own], sizes)])
 
 
@@ -125,10 +128,10 @@ def from_streams(stream: Int64, starts: Int64, stops: Int64) -> Polyhedra:
         sizes = stream[at[active]]
         if (sizes < LEAST_CORNERS).any():
             raise ValueError(f"a polyhedron has a face with {sizes.min()} corners")
+        if (sizes >= stops[active] - at[active]).any():  # before a sum, which may wrap
+            raise ValueError("the faces of its polyhedra are cut short")
         found.append(np.stack([active, np.full(len(active), rank), at[active] + 1, sizes], axis=1))
         at[active] += sizes + 1
-        if (at[active] > stops[active]).any():
-            raise ValueError("the faces of its polyhedra are cut short")
     if (at != stops).any():
         raise ValueError("the faces of its polyhedra end elsewhere")
     rows = np.concatenate([np.zeros((0, 4), np.int64), *found])
@@ -139,6 +142,11 @@ def from_streams(stream: Int64, starts: Int64, stops: Int64) -> Polyhedra:
 def ranges(starts: Int64, sizes: Int64) -> Int64:
     """Numbers from each start on, so many of each, one after the other."""
     return np.repeat(starts, sizes) + np.arange(sizes.sum()) - np.repeat(_starts(sizes), sizes)
+
+
+def _are_bounds(sizes: Int64, end: int) -> bool:
+    """Whether sizes are those of so many in all; sums of hostile ones wrap."""
+    return bool(sizes.min(initial=0) >= 0 and sizes.max(initial=0) <= end and sizes.sum() == end)
 
 
 def _starts(sizes: Int64) -> Int64:

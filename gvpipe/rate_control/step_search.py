@@ -81,7 +81,7 @@ class Flat:
         """From two steps and the errors that they left, model units; None where errors follow steps, or fall."""
         (step, error), (other, other_error) = before, after
         factor = (other_error**2 - error**2) / (other**2 - step**2)
-        if not factor > 0 or log(other_error / error) / log(other / step) >= FLAT_SLOPE:
+        if not factor > 0 or (log(other_error) - log(error)) / log(other / step) >= FLAT_SLOPE:
             return None
         return cls(math.sqrt(max(error**2 - factor * step**2, 0.0)), factor)
 
@@ -201,7 +201,7 @@ class StepSearch:
         (step, error), (other, other_error) = self._measured[-2:]
         if not other > step or other_error >= self.goal.close_enough[0] * self.goal.target_error:
             return False
-        return last or log(other_error / error) < FLAT_SLOPE * log(other / step)
+        return last or log(other_error) - log(error) < FLAT_SLOPE * log(other / step)
 
     def _is_dearer(self) -> bool:
         """Whether a larger step cost more, where errors hardly follow steps and the one before was fine enough."""
@@ -282,7 +282,7 @@ def root_mean_square(sequence: MeshSequence, reader: FrameReader) -> float:
 
 def _slope_between(before: tuple[float, float], after: tuple[float, float]) -> float:
     """The slope of log(error) over log(step) between two ``(step, error)``, kept within `SLOPES`."""
-    slope = log(after[1] / before[1]) / log(after[0] / before[0])
+    slope = (log(after[1]) - log(before[1])) / log(after[0] / before[0])
     return min(max(slope, SLOPES[0]), SLOPES[1])
 
 

@@ -27,11 +27,10 @@ import numpy as np
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
-from gvpipe.foundation.errors import InputError
+from gvpipe.foundation.arrays import Float64, Int32, Integers
 from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
-from gvpipe.trajectory.contexts import LARGEST, MAX_LEVEL, N_CONTEXTS, Residuals, context_inputs, level_of
+from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, Residuals, check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors
 from gvpipe.trajectory.trellis import FINENESS
 from gvpipe.trajectory.trellis_coding import TrellisDecoder, encode_numbers
@@ -74,7 +73,7 @@ def encode_vectors(
     wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
     decoded = np.zeros(target.shape) if given is None else given.copy()
     predict_vectors(causal, step, wide, decoded, target, predictor, beta)
-    largest = _check_residuals(wide)
+    largest = check_residuals(wide)
     residuals: Integers = wide.astype(np.int32) if largest <= np.iinfo(np.int32).max else wide
     del wide  # what follows takes as much memory again
     levels = level_of(residuals)
@@ -92,7 +91,7 @@ def _encode_trellis(
 ) -> tuple[bytes, Float64]:
     """As `encode_vectors`, on a trellis."""
     numbers, ranked, decoded = search(target, step, causal, given, penalty)
-    _check_residuals(ranked)
+    check_residuals(ranked)
     levels = level_of(ranked)
     words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
     return pack_block(encode_integers(np.diff(levels, prepend=0))) + varint(TRELLIS) + words, decoded
@@ -155,14 +154,6 @@ def decode_vectors(
     if n_blocks is None:
         coder.end()
     return decoded
-
-
-def _check_residuals(residuals: Int64) -> int:
-    """Return the largest magnitude of ``residuals (m, R)``; raises `InputError` where it does not fit."""
-    largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
-    if largest >= LARGEST:
-        raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
-    return largest
 
 
 def _parts(bounds: Int32) -> list[tuple[int, int]]:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.foundation.arrays import Int32, Int64, Integers
+from gvpipe.foundation.errors import InputError
 from gvpipe.trajectory.causal_order import CausalOrder
 
 SHORT = (16, 10, 6, 4)  # weights of a vector's earlier components, the latest first
@@ -96,6 +97,14 @@ def _logs() -> Int64:
 def level_bounds() -> Int64:
     """``(MAX_LEVEL + 1,)``: 2 ** (level / 4) rounded down, exactly."""
     return np.array([math.isqrt(math.isqrt(1 << level)) for level in range(MAX_LEVEL + 1)], np.int64)
+
+
+def check_residuals(residuals: Int64) -> int:
+    """Return the largest magnitude of ``residuals (m, R)``; raises `InputError` where it does not fit."""
+    largest = max(int(residuals.max(initial=0)), -int(residuals.min(initial=0)))
+    if largest >= LARGEST:
+        raise InputError(f"a residual has {largest} quantisation steps, at most {LARGEST} fit; ask for a lower quality")
+    return largest
 
 
 def level_of(residuals: Integers) -> Int64:

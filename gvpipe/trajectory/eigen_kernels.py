@@ -205,7 +205,7 @@ def _factor_shifted(diagonal: Float64, beside: Float64, value: float, norm: floa
     for i in range(n - 1):
         below, after = beside[i], diagonal[i + 1] - value
         beyond = beside[i + 1] if i + 2 < n else 0.0
-        if abs(own) >= abs(below):
+        if abs(own) >= abs(below) or abs(below) < least:  # a tiny pivot would let a vector grow out of range
             if abs(own) < least:
                 own = least
             factor = below / own

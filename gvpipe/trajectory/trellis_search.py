@@ -18,7 +18,7 @@ from gvpipe.entropy.tokens import N_EXTRA, tokenise
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
-from gvpipe.trajectory.contexts import context_inputs, level_of
+from gvpipe.trajectory.contexts import check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors
 from gvpipe.trajectory.trellis import FINENESS, first_tables
 
@@ -44,7 +44,9 @@ def search(
     plain, residuals = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
     decoded, found = (np.zeros(target.shape) if given is None else given.copy() for _ in range(2))
     predict_vectors(causal, step, plain, decoded, target, "kalman", 0.0)
+    check_residuals(plain)  # what follows holds for smaller ones alone
     fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
+    check_residuals(fine)
     inputs = context_inputs(causal, len(target), level_of(fine), len(causal.blocks) - 1)
     coding = VectorCoding(causal, step * FINENESS, residuals, found, target)
     return search_paths(coding, find_all_contexts(fine, inputs), _prices(), penalty), residuals, found

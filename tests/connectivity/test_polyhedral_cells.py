@@ -106,6 +106,15 @@ def test_damaged_sections() -> None:
         decode_polyhedral(data + b"\0", *shape)
 
 
+def test_one_cell_of_many_faces_ends_at_the_limit_of_steps() -> None:
+    """Each of its faces looks at all edges so far, so that a cell alone would take the square of them."""
+    n = 60_000
+    cells = Cells(np.array([42], np.uint8), np.array([0, 3 * n]), np.arange(3 * n),
+                  Polyhedra(np.array([n]), np.full(n, 3), np.arange(3 * n)))  # fmt: skip
+    with pytest.raises(InputError, match="too many faces at one edge or point"):
+        encode_polyhedral(cells, np.zeros((0, 3), np.int64), None, (0, 3 * n), True)
+
+
 def test_points_of_no_cell_are_refused() -> None:
     cells, surface, counts = numbered(*voronoi(12))
     with pytest.raises(InputError, match="belongs to no cell"):

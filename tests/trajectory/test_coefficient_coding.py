@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gvpipe.foundation.errors import CorruptFile
+from gvpipe.foundation.errors import CorruptFile, InputError
 from gvpipe.trajectory import coefficient_coding
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 from gvpipe.trajectory.temporal_neighbours import temporal_order
@@ -24,6 +24,14 @@ def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
     known = causal.order[: causal.blocks[1]]
     assert np.allclose(part[known], decoded[known], atol=1e-9)
     assert 8 * len(data) < 0.6 * target.size * np.log2(np.abs(target).mean() / 0.01)
+
+
+@pytest.mark.parametrize("penalty", [None, 1.0])
+@pytest.mark.parametrize("size", [1e14, 1e30])
+def test_residuals_that_do_not_fit_are_refused(penalty: float | None, size: float) -> None:
+    target = np.random.default_rng(0).normal(size=(12, 2)) * size
+    with pytest.raises(InputError, match="ask for a lower quality"):
+        encode_vectors(target, 1.0, temporal_order(4), penalty=penalty)
 
 
 def test_a_trellis_takes_fewer_bits_at_the_same_error() -> None:

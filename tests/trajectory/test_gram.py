@@ -20,6 +20,9 @@ SYMMETRIC = {
     "repeated": gram_of_columns(RNG.standard_normal((40, 3)).repeat(8, axis=1)),
     "tiny": 1e-200 * gram_of_columns(RNG.standard_normal((20, 12))),
     "huge": 1e200 * gram_of_columns(RNG.standard_normal((20, 12))),
+    "nearly decoupled": np.diag([1.0, 1 - 2.0**-53, 1 - 2.0**-53, 1.0])
+    + np.diag([1e-200, 1e-150, 1e-145], 1)
+    + np.diag([1e-200, 1e-150, 1e-145], -1),
     "indefinite": np.array([[0.0, 2.0, 0.0], [2.0, 0.0, 1.0], [0.0, 1.0, -4.0]]),
 }
 

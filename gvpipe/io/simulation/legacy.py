@@ -209,7 +209,7 @@ def _cells(parsed: _Parsed, kind: str) -> Cells:
 
 def _with_polyhedra(types: UInt8, offsets: Int64, nodes: Int64) -> Cells:
     """Cells whose polyhedra are streams of faces, by their points."""
-    if len(offsets) != len(types) + 1 or offsets[0] != 0 or offsets[-1] != len(nodes):
+    if len(offsets) != len(types) + 1 or offsets[0] != 0 or offsets[-1] != len(nodes) or (offsets[1:] < offsets[:-1]).any():
         return Cells(types, offsets, nodes)  # which says what is wrong
     is_polyhedron = types == POLYHEDRON
     polyhedra = from_streams(nodes, offsets[:-1][is_polyhedron], offsets[1:][is_polyhedron])

@@ -34,6 +34,7 @@ UNIT = "Units"  # attribute of an array; gvpipe's own
 LONGEST_UNIT = 100  # characters
 POLY_GROUPS = {"Vertices": POLY_CELLS["Verts"], "Lines": POLY_CELLS["Lines"], "Polygons": POLY_CELLS["Polys"],
                "Strips": POLY_CELLS["Strips"]}  # fmt: skip
+FACE_TABLES = ("FaceConnectivityOffsets", "FaceOffsetsOffsets", "PolyhedronToFaceIdOffsets")  # of steps
 POLYHEDRON_SIZES = ("NumberOfFaces", "NumberOfFaceConnectivityIds", "NumberOfPolyhedronToFaceIds")
 MAX_STEPS = 10_000_000
 
@@ -270,15 +271,16 @@ class VtkHdfSteps:
                 if kind is None
                 else np.full(n_cells, kind, np.uint8)
             )
-            pieces.append(Cells(types, offsets, nodes, self._polyhedra(types, cell, number)))
+            pieces.append(Cells(types, offsets, nodes, self._polyhedra(types, step, cell, number)))
             cell, node = cell + n_cells, node + n_nodes
         return pieces
 
-    def _polyhedra(self, types: UInt8, cell: int, number: int) -> Polyhedra | None:
+    def _polyhedra(self, types: UInt8, step: int, cell: int, number: int) -> Polyhedra | None:
         """The faces of a part's polyhedra; None where there are none.
 
         Args:
             types: of the part's cells.
+            step: of the file.
             cell: number of the first of them in the file.
             number: of the part.
         """
@@ -287,6 +289,8 @@ class VtkHdfSteps:
             return None
         if any(len(self._sizes(name)) <= number for name in POLYHEDRON_SIZES):
             raise ValueError(f"it has no sizes of the polyhedra of part {number}")
+        if any(self._offset(name, step, 0) for name in FACE_TABLES):
+            raise ValueError("its lists of faces change from step to step; write a file for each step, or the cells once")
         face, corner, listed = (int(self._sizes(name)[:number].sum()) for name in POLYHEDRON_SIZES)
         n_faces, n_corners, n_listed = (int(self._sizes(name)[number]) for name in POLYHEDRON_SIZES)
 

@@ -23,12 +23,11 @@ from gvpipe.io.losses import renamed_note
 from gvpipe.io.simulation.grid_content import grid_content, grid_sequence, inside_notes
 from gvpipe.io.simulation.hdf import import_h5py
 from gvpipe.io.simulation.poly_content import ROLES, PolyContent, poly_content
-from gvpipe.io.simulation.vtkhdf import ASSEMBLY, POLY_GROUPS, POLYHEDRON_SIZES, ROOT, UNIT
+from gvpipe.io.simulation.vtkhdf import ASSEMBLY, FACE_TABLES, POLY_GROUPS, POLYHEDRON_SIZES, ROOT, UNIT
 from gvpipe.io.simulation.vtkhdf_blocks import Block, find_blocks, own_blocks
 from gvpipe.model.sequence import MeshSequence
 
 VERSION, POLYHEDRA_VERSION = (2, 3), (2, 5)
-POLYHEDRON_STEPS = ("FaceConnectivityOffsets", "FaceOffsetsOffsets", "PolyhedronToFaceIdOffsets")
 GROUPS = (("PointData", "vertex"), ("CellData", "triangle"))
 SIZES = ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds")
 CHUNK = 1 << 16  # rows of a compressed chunk at most
@@ -138,7 +137,7 @@ def _write_polyhedra(root: Any, cells: Cells, polyhedra: Polyhedra) -> tuple[str
     }
     for key, values in lists.items():
         _dataset(root, key, values.shape, values.dtype)[...] = values
-    return POLYHEDRON_STEPS
+    return FACE_TABLES
 
 
 def start_set(above: Any, path: str, kind: str) -> Any:

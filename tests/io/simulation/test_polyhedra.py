@@ -141,6 +141,42 @@ def test_vtu_of_both_layouts(new: bool, tmp_path: Path) -> None:
         gvpipe.read(tmp_path / "b.vtu")
 
 
+HUGE = 2**63 - 1
+HOSTILE = {  # bounds whose differences wrap, so that they add up
+    "offsets": ("offsets", [HUGE, -HUGE - 2, -1]),
+    "face_offsets": ("face_offsets", [HUGE, -HUGE - 2, -1, 4]),
+    "polyhedron_offsets": ("polyhedron_offsets", [HUGE, -HUGE - 2, -1]),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_bounds_that_wrap_are_refused(name: str, tmp_path: Path) -> None:
+    array, values = HOSTILE[name]
+    values = [each if each <= HUGE and each >= -HUGE - 1 else HUGE for each in values]
+    text = vtu(grid(), True)
+    start = text.index(">", text.index(f'Name="{array}"')) + 1
+    stop = text.index("<", start)
+    kept = text[start:stop].split()[len(values) :]
+    (tmp_path / "a.vtu").write_text(text[:start] + " ".join(map(str, values)) + " " + " ".join(kept) + text[stop:])
+    with pytest.raises(InputError, match=r"a\.vtu"):
+        gvpipe.read(tmp_path / "a.vtu", volume=True)
+
+
+def test_counts_that_wrap_are_refused() -> None:
+    quarter = np.array([2**62] * 4 + [3])
+    with pytest.raises(ValueError, match="other numbers of faces or corners"):
+        Polyhedra(quarter, np.full(3, 3), np.zeros(9, np.int64))
+    with pytest.raises(ValueError, match="cut short"):
+        from_streams(np.array([1, HUGE, 0, 1, 2]), np.array([0]), np.array([5]))
+
+
+def test_faces_that_all_share_are_refused() -> None:
+    """Else a list of n times one face of n corners would take the square of n numbers."""
+    n = 2000
+    with pytest.raises(ValueError, match="at most two can have each"):
+        from_faces(np.array([0, n]), np.zeros(n, np.int64), np.array([0, n]), np.arange(n))
+
+
 def test_legacy_files_have_streams(tmp_path: Path) -> None:
     stream = streams(0, 2)
     half = len(stream) // 2
