@@ -75,7 +75,7 @@ def test_cameras_look_from_where_pictures_do(player: Player, site: Site, view: A
 
 def test_a_camera_that_is_none_is_the_players_own(player: Player, site: Site) -> None:
     opened(player, panel(), site)
-    own = player("return element.projection")
+    own = player("await new Promise((done) => setTimeout(done, 300)); return element.projection")  # once its size has settled
     for text in ("", "1", "1,2,3", "a,b", "0,91"):
         assert player("element.setAttribute('camera', args[0]); return element.projection", text) == own
     assert not np.allclose(player("element.setAttribute('camera', '90,0'); return element.projection"), own)
