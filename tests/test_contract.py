@@ -67,7 +67,7 @@ CHOSEN = {
     for settings in SETTINGS.get(codec, [{}])
 }
 VARIANTS = [pytest.param(*variant, id=name) for name, variant in CHOSEN.items()]
-AWKWARD_CASES = [  # codecs meet every second input, in one of both orders, and with settings every fourth; others in the slow run
+AWKWARD_CASES = [  # codecs meet every second input, in one of both orders; with settings every fourth; others in the slow run
     pytest.param(
         *variant.values,
         reorder,
