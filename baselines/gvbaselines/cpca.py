@@ -26,12 +26,12 @@ import numpy as np
 from scipy.linalg import eigh
 
 from gvbaselines.baseline import Baseline
-from gvbaselines.numbers import STEP, decode_columns, encode_columns, multiples, quantise, read_step
+from gvbaselines.numbers import STEP, decode_columns, decode_labels, encode_columns, multiples, quantise, read_step
 from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.container.json_object import JsonObject
-from gvpipe.entropy.integers import decode_integers, encode_integers
+from gvpipe.entropy.integers import encode_integers
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.basis import (
     Basis,
@@ -96,9 +96,7 @@ class ClusteredPca(Baseline):
         """Mirror of `code_frames`."""
         step = read_step(cursor)
         n_clusters = cursor.varint(min(MAX_CLUSTERS, mesh.n_points), "the number of clusters")
-        labels = np.cumsum(decode_integers(cursor.block(), mesh.n_points, name=cursor.name))
-        if labels.min() < 0 or labels.max() >= n_clusters:
-            raise cursor.corrupt("a label names a cluster that does not exist")
+        labels = decode_labels(cursor, cursor.block(), mesh.n_points, n_clusters)
         trajectories = np.zeros((mesh.n_points, 3 * n_frames))
         for k in range(n_clusters):
             members = np.flatnonzero(labels == k)

@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gvbaselines.baseline import Baseline
-from gvbaselines.numbers import STEP, frame_contexts, pack_origin, quantise, read_origin, read_step
+from gvbaselines.numbers import STEP, check_lattice, frame_contexts, pack_origin, quantise, read_origin, read_step
 from gvbaselines.parallelogram import traversal_of
 from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
@@ -37,7 +37,6 @@ from gvpipe.mesh.traversal import Traversal
 
 PREDICTORS = ("elp", "replica", "space", "time")
 STEP_PER_ERROR = 2.0  # rounding leaves step / sqrt(12) on each of three axes
-MAX_POINT = 1 << 40  # lattice units: beyond, products of three would not fit
 
 
 @dataclass(frozen=True)
@@ -87,8 +86,7 @@ class Dynapack(Baseline):
         residuals = decode_integers(cursor.rest(), count, frame_contexts(shape), cursor.name).reshape(shape)
         points = np.zeros(shape, np.int64)
         _predict(points, residuals, traversal_of(mesh), predictor, decodes=True)
-        if points.size and not np.abs(points.astype(np.float64)).max() < MAX_POINT:
-            raise cursor.corrupt("a point lies outside of the lattice")
+        check_lattice(cursor, points)
         return origin + step * points
 
 

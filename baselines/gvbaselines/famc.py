@@ -32,6 +32,7 @@ from gvbaselines.baseline import Baseline
 from gvbaselines.numbers import (
     STEP,
     decode_columns,
+    decode_labels,
     encode_columns,
     multiples,
     pack_origin,
@@ -105,12 +106,10 @@ class Famc(Baseline):
         traversal = traversal_of(mesh)
         residuals = decode_integers(cursor.block(), 3 * mesh.n_points, name=cursor.name).reshape(-1, 3)
         base = origin + base_step * values_of(residuals, traversal)
-        labels = np.zeros(mesh.n_points, np.int64)
-        labels[traversal.order] = np.cumsum(decode_integers(cursor.block(), mesh.n_points, name=cursor.name))
-        coded_weights = cursor.block()
+        coded_labels, coded_weights = cursor.block(), cursor.block()
         n_clusters = cursor.varint(min(MAX_CLUSTERS, mesh.n_points), "the number of clusters")
-        if labels.min() < 0 or labels.max() >= n_clusters:
-            raise cursor.corrupt("a label names a cluster that does not exist")
+        labels = np.zeros(mesh.n_points, np.int64)
+        labels[traversal.order] = decode_labels(cursor, coded_labels, mesh.n_points, n_clusters)
         beside = find_candidates(mesh, labels)
         weights = decode_integers(coded_weights, int(beside.is_used.sum()), name=cursor.name)
         if np.abs(weights).max(initial=0) > MAX_WEIGHT:

@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gvbaselines.baseline import Baseline
-from gvbaselines.numbers import STEP, frame_contexts, pack_origin, quantise, read_origin, read_step
+from gvbaselines.numbers import STEP, check_lattice, frame_contexts, pack_origin, quantise, read_origin, read_step
 from gvbaselines.parallelogram import residuals_of, traversal_of, values_of
 from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
@@ -36,7 +36,6 @@ from gvpipe.mesh.topology import opposite_corners
 
 PREDICTORS = ("angle", "motion")
 STEP_PER_ERROR = 2.0  # rounding leaves step / sqrt(12) on each of three axes
-MAX_POINT = 1 << 40  # lattice units
 
 
 @dataclass(frozen=True)
@@ -82,8 +81,7 @@ class Maverg(Baseline):
         points = np.zeros(shape, np.int64)
         points[0] = values_of(residuals[0], traversal_of(mesh))
         predict(points, residuals, causal_of(mesh, predictor), True)
-        if points.size and not np.abs(points.astype(np.float64)).max() < MAX_POINT:
-            raise cursor.corrupt("a point lies outside of the lattice")
+        check_lattice(cursor, points)
         return origin + step * points
 
 

@@ -15,6 +15,7 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Float64, Int64
 
 STEP = struct.Struct("<d")
+MAX_POINT = 1 << 40  # lattice units: beyond, products of three would not fit
 ORIGIN = struct.Struct("<3d")
 MAX_CLASS = 127
 LARGEST = 2.0**38  # steps; the entropy coder takes 2**39
@@ -39,6 +40,20 @@ def frame_contexts(shape: tuple[int, ...]) -> Int64:
     contexts = np.ones(shape, np.int64)
     contexts[0] = 0
     return contexts
+
+
+def check_lattice(cursor: Cursor, points: Int64) -> None:
+    """Raise `CorruptFile` if a point lies outside of the lattice."""
+    if points.size and not np.abs(points.astype(np.float64)).max() < MAX_POINT:
+        raise cursor.corrupt("a point lies outside of the lattice")
+
+
+def decode_labels(cursor: Cursor, block: bytes, n_points: int, n_clusters: int) -> Int64:
+    """Labels ``(P,)``, coded as differences to the one before; raises `CorruptFile` where one has no cluster."""
+    labels = np.cumsum(decode_integers(block, n_points, name=cursor.name))
+    if labels.min() < 0 or labels.max() >= n_clusters:
+        raise cursor.corrupt("a label names a cluster that does not exist")
+    return labels
 
 
 def encode_columns(values: Int64) -> bytes:

@@ -28,6 +28,7 @@ from gvbaselines.cpca import find_space
 from gvbaselines.numbers import (
     STEP,
     decode_columns,
+    decode_labels,
     encode_columns,
     multiples,
     pack_origin,
@@ -89,9 +90,7 @@ class RigidTransforms(Baseline):
         base = origin + base_step * values_of(residuals, traversal)
         n_clusters = cursor.varint(mesh.n_points, "the number of clusters")
         labels = np.zeros(mesh.n_points, np.int64)
-        labels[traversal.order] = np.cumsum(decode_integers(cursor.block(), mesh.n_points, name=cursor.name))
-        if labels.min() < 0 or labels.max() >= n_clusters:
-            raise cursor.corrupt("a label names a cluster that does not exist")
+        labels[traversal.order] = decode_labels(cursor, cursor.block(), mesh.n_points, n_clusters)
         series = np.cumsum(np.cumsum(decode_columns(cursor, n_frames, 6 * n_clusters), axis=0), axis=0)
         cursor.end()
         motion = multiples(series, motion_step).reshape(n_frames, n_clusters, 6)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.connectivity.cell_poses import Poses
+from gvpipe.connectivity.vote_kernels import sort_votes, vote
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 from gvpipe.foundation.arrays import Int64
 from gvpipe.runtime.compiled import compiled
@@ -360,17 +361,12 @@ def _code_node(
             a, b = front.nodes[g, (corner + 1) % count], front.nodes[g, (corner + count - 1) % count]
             has_a, has_b = _is_among(a, local, i), _is_among(b, local, i)
             if not (has_a or has_b):  # it touches the cell in one point
-                n = _vote(b, 1, candidates, votes, _vote(a, 1, candidates, votes, n))
+                n = vote(b, 1, candidates, votes, vote(a, 1, candidates, votes, n))
             if has_a == has_b:
                 continue
             shared = a if has_a else b
-            n = _vote(b if has_a else a, 8 + min(_cells_at(front, local[j], shared), 7), candidates, votes, n)
-    for k in range(1, n):  # most votes first; of equal ones the first found
-        point, vote, at = candidates[k], votes[k], k
-        while at > 0 and votes[at - 1] < vote:
-            candidates[at], votes[at] = candidates[at - 1], votes[at - 1]
-            at -= 1
-        candidates[at], votes[at] = point, vote
+            n = vote(b if has_a else a, 8 + min(_cells_at(front, local[j], shared), 7), candidates, votes, n)
+    sort_votes(candidates, votes, n)
     if n:
         best = min(votes[0] >> 2, 15)
     value = 0
@@ -441,19 +437,6 @@ def _is_among(point: int, points: Int64, count: int) -> bool:
     for i in range(count):
         found |= points[i] == point
     return bool(found)
-
-
-@compiled
-def _vote(point: int, votes_for: int, candidates: Int64, votes: Int64, n: int) -> int:
-    """Count votes for a candidate; return how many candidates there are."""
-    for k in range(n):
-        if candidates[k] == point:
-            votes[k] += votes_for
-            return n
-    if n < len(candidates):
-        candidates[n], votes[n] = point, votes_for
-        n += 1
-    return n
 
 
 @compiled

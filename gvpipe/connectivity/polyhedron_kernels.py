@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gvpipe.connectivity.vote_kernels import sort_votes, vote
 from gvpipe.entropy.serial_kernels import SerialCoder, code_value, refuse
 from gvpipe.foundation.arrays import Int64
 from gvpipe.runtime.compiled import compiled
@@ -328,7 +329,7 @@ def _code_point(
         at = cell.face[(i + size - 1) % size if k == 0 else (i + 1) % size]
         if at >= 0:
             n = _near_points(front, cell, at, candidates, votes, n)
-    _sort(candidates, votes, n)
+    sort_votes(candidates, votes, n)
     value = 0
     if coder.encodes and names[wanted] >= 0:
         value = n + 1
@@ -390,8 +391,8 @@ def _near_faces(front: Open, cell: Cell, size: int, candidates: Int64, votes: In
             before = front.nodes[start + (at - start + length - 1) % length]
             if (after != b and before != b) or (size and (length != size or _count_turns(front, cell, g, size)[0] == 0)):
                 continue
-            n = _vote(g, 1, candidates, votes, n)
-    _sort(candidates, votes, n)
+            n = vote(g, 1, candidates, votes, n)
+    sort_votes(candidates, votes, n)
     return n
 
 
@@ -429,31 +430,7 @@ def _vote_point(cell: Cell, point: int, count: int, candidates: Int64, votes: In
     for i in range(cell.about[2]):
         if cell.face[i] == point:
             return n
-    return _vote(point, count, candidates, votes, n)
-
-
-@compiled
-def _vote(one: int, count: int, candidates: Int64, votes: Int64, n: int) -> int:
-    """Count votes for a candidate; return how many candidates there are."""
-    for k in range(n):
-        if candidates[k] == one:
-            votes[k] += count
-            return n
-    if n < len(candidates):
-        candidates[n], votes[n] = one, count
-        n += 1
-    return n
-
-
-@compiled
-def _sort(candidates: Int64, votes: Int64, n: int) -> None:
-    """Most votes first; of equal ones the first found."""
-    for k in range(1, n):
-        one, vote, at = candidates[k], votes[k], k
-        while at > 0 and votes[at - 1] < vote:
-            candidates[at], votes[at] = candidates[at - 1], votes[at - 1]
-            at -= 1
-        candidates[at], votes[at] = one, vote
+    return vote(point, count, candidates, votes, n)
 
 
 @compiled

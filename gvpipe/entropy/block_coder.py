@@ -21,7 +21,7 @@ from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, check_sizes, model
-from gvpipe.foundation.arrays import Int64, Integers, UInt8
+from gvpipe.foundation.arrays import Int64, Integers, UInt8, UInt32, UInt64
 from gvpipe.foundation.elementary import log2
 
 PARAMETRIC = 1  # kind of a table that two numbers describe
@@ -107,14 +107,7 @@ class BlockDecoder:
 
     def check(self, status: int) -> None:
         """Raise `CorruptFile` if a kernel's status is an error."""
-        from gvpipe.entropy.block_kernels import NO_TABLE, OUT_OF_RANGE
-
-        if status == NO_TABLE:
-            raise self._cursor.corrupt("a context is used that has no table")
-        if status == OUT_OF_RANGE:
-            raise self._cursor.corrupt("a residual is out of range")
-        if status:
-            raise self._cursor.corrupt("its range-coded data do not decode")
+        check_status(self._cursor, status)
 
     def _table(self) -> Int64:
         """The next context's frequencies; none if it is empty."""
@@ -131,10 +124,27 @@ class BlockDecoder:
 
     def end(self) -> None:
         """Check that no word is left."""
-        from gvpipe.entropy import range_decoder
+        check_end(self._cursor, self.stream.state, self.stream.words)
 
-        if not range_decoder.may_be_exhausted(self.stream.state, self.stream.words):
-            raise self._cursor.corrupt("range-coded data are left over")
+
+def check_status(cursor: Cursor, status: int) -> None:
+    """Raise `CorruptFile` if a kernel's status is an error."""
+    from gvpipe.entropy.block_kernels import NO_TABLE, OUT_OF_RANGE
+
+    if status == NO_TABLE:
+        raise cursor.corrupt("a context is used that has no table")
+    if status == OUT_OF_RANGE:
+        raise cursor.corrupt("a residual is out of range")
+    if status:
+        raise cursor.corrupt("its range-coded data do not decode")
+
+
+def check_end(cursor: Cursor, state: UInt64, words: UInt32) -> None:
+    """Raise `CorruptFile` if words are left, given a decoder's state and all of its words."""
+    from gvpipe.entropy import range_decoder
+
+    if not range_decoder.may_be_exhausted(state, words):
+        raise cursor.corrupt("range-coded data are left over")
 
 
 def _describe(counts: Int64) -> tuple[bytes, Int64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.container.cursor import Cursor
+from gvpipe.entropy.block_coder import check_end, check_status
 from gvpipe.foundation.arrays import Int64
 from gvpipe.trajectory.contexts import ContextInputs, Residuals
 from gvpipe.trajectory.trellis import first_tables
@@ -49,18 +50,10 @@ class TrellisDecoder:
 
     def take(self, residuals: Residuals, inputs: ContextInputs, first_block: int, end_block: int) -> None:
         """Decode residuals of blocks, those before ``first_block`` being done; raises `CorruptFile` if they do not decode."""
-        from gvpipe.entropy.block_kernels import OUT_OF_RANGE
         from gvpipe.trajectory.trellis_kernels import code_residuals
 
-        status = code_residuals(residuals, inputs, self._stream, first_block, end_block, False)
-        if status == OUT_OF_RANGE:
-            raise self._cursor.corrupt("a residual is out of range")
-        if status:
-            raise self._cursor.corrupt("its range-coded data do not decode")
+        check_status(self._cursor, code_residuals(residuals, inputs, self._stream, first_block, end_block, False))
 
     def end(self) -> None:
         """Check that no word is left."""
-        from gvpipe.entropy import range_decoder
-
-        if not range_decoder.may_be_exhausted(self._stream.state, self._stream.words):
-            raise self._cursor.corrupt("range-coded data are left over")
+        check_end(self._cursor, self._stream.state, self._stream.words)
