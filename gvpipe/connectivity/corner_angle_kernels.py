@@ -45,7 +45,9 @@ class Angles(NamedTuple):
 def new_angles(triangles: Int32, opposite: Int64, n_vertices: int) -> Angles:
     """No angle is known of the vertices of ``triangles (T, 3)``; ``opposite (3T,)`` is of `opposite_corners`."""
     flat = triangles.ravel()
-    angles = Angles(np.full(n_vertices, 2.0), np.zeros(n_vertices, np.int64), np.zeros(n_vertices), np.zeros(n_vertices, np.int64))
+    angles = Angles(
+        np.full(n_vertices, 2.0), np.zeros(n_vertices, np.int64), np.zeros(n_vertices), np.zeros(n_vertices, np.int64)
+    )
     for corner in range(len(flat)):
         angles.corners[flat[corner]] += 1
         if opposite[corner] < 0:

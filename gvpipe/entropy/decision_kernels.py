@@ -179,9 +179,7 @@ def read_slots(mixing: Mixing, slots: Int64) -> None:
 
 
 @compiled
-def code_inputs(
-    mixing: Mixing, mixer: int, rate: tuple[int, int], state: Int64, data: UInt8, decoding: bool, bit: int
-) -> int:
+def code_inputs(mixing: Mixing, mixer: int, rate: tuple[int, int], state: Int64, data: UInt8, decoding: bool, bit: int) -> int:
     """Code or decode a decision by the inputs alone; the mixer learns, by ``rate``: a factor, and bits to shift by."""
     inputs, weights = mixing.inputs, mixing.weights[mixer]
     n = len(inputs) - 1

@@ -76,17 +76,16 @@ def code_forecast(
     """
     slots = np.empty(len(contexts), np.int64)
     magnitude, length = abs(number), 0
-    whole = 1.0  # probability of what is left
+    from_low, from_high = 1.0, 0.0  # probabilities of the magnitudes from two bounds on
     while True:
         least = 1 << length
-        above = tail(forecast, least - 0.5) + tail(forecast, least - 0.5, True)
-        _set_inputs(mixing, forecast, (least >> 1, least, 1 << MAX_LENGTH), whole - above, above)
+        from_middle = chance_from(forecast, least)
+        _set_inputs(mixing, forecast, (least >> 1, least, 1 << MAX_LENGTH), from_low - from_middle, from_middle)
         bit = 1 if magnitude >> length else 0
-        bit = _code(mixing, contexts, slots, length, MIXERS * group + min(length, 1), rate, coder, bit)
-        if not bit:
-            whole -= above
+        if not _code(mixing, contexts, slots, length, MIXERS * group + min(length, 1), rate, coder, bit):
+            from_high = from_middle
             break
-        whole = above
+        from_low = from_middle
         length += 1
         if length >= MAX_LENGTH:
             return 1 << MAX_LENGTH
@@ -95,12 +94,16 @@ def code_forecast(
     value = 1
     for place in range(length - 2, -1, -1):
         low = value << (place + 1)
-        middle, high = low + (1 << place), low + (2 << place)
-        above = chance_between(forecast, middle, high) + chance_between(forecast, 1 - high, 1 - middle)
-        _set_inputs(mixing, forecast, (low, middle, high), whole - above, above)
+        middle = low + (1 << place)
+        from_middle = chance_from(forecast, middle)
+        bounds = (low, middle, low + (2 << place))
+        _set_inputs(mixing, forecast, bounds, from_low - from_middle, from_middle - from_high)
         node = (length << 4 | value) + NODES if length - 2 - place < MODELLED else (length << 4 | place) + DEEP_NODES
         bit = _code(mixing, contexts, slots, node, MIXERS * group + 2, rate, coder, (magnitude >> place) & 1)
-        whole = above if bit else whole - above
+        if bit:
+            from_low = from_middle
+        else:
+            from_high = from_middle
         value = value << 1 | bit
     _set_sign_inputs(mixing, forecast, value)
     if _code(mixing, contexts, slots, SIGN, MIXERS * group + 3, rate, coder, 1 if number < 0 else 0):
@@ -109,11 +112,13 @@ def code_forecast(
 
 
 @compiled
-def tail(forecast: Forecast, bound: float, below: bool = False) -> float:
-    """Probability above ``bound``, or below its negative."""
-    centre = -forecast.shape[CENTRE] if below else forecast.shape[CENTRE]
-    scaled = (bound - centre) / (2.0 * forecast.shape[SCALE])
-    return _upper(scaled) if scaled > 0 else 1.0 - _upper(-scaled)
+def chance_from(forecast: Forecast, least: int) -> float:
+    """Probability of the magnitudes from ``least`` on, 1 or more."""
+    width = 2.0 * forecast.shape[SCALE]
+    above, below = (least - 0.5 - forecast.shape[CENTRE]) / width, (least - 0.5 + forecast.shape[CENTRE]) / width
+    chance = _upper(above) if above > 0 else 1.0 - _upper(-above)
+    chance += _upper(below) if below > 0 else 1.0 - _upper(-below)
+    return chance
 
 
 @compiled
@@ -134,7 +139,7 @@ def _upper(scaled: float) -> float:
     """Upper tail of Student's distribution of four degrees of freedom, at twice ``scaled``, 0 or more."""
     root = np.sqrt(1.0 + scaled * scaled)
     rest = 1.0 / (root * (root + scaled))  # 1 - scaled / root
-    return rest * rest * (3.0 - rest) * 0.25
+    return float(rest * rest * (3.0 - rest) * 0.25)
 
 
 @compiled
@@ -148,7 +153,7 @@ def _set_inputs(mixing: Mixing, forecast: Forecast, bounds: tuple[int, int, int]
             listed_zero += forecast.chances[j]
         elif middle <= magnitude < high:
             listed_one += forecast.chances[j]
-    _set_pair(mixing, forecast, (max(zero, 0.0), one), (listed_zero, listed_one))
+    _set_pair(mixing, forecast, (max(zero, 0.0), max(one, 0.0)), (listed_zero, listed_one))
 
 
 @compiled
