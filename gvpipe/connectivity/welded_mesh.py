@@ -115,7 +115,7 @@ def _begin_points(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int) 
     """Decode the points; return these, and a function that decodes the vertices. Both raise `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
     flags = cursor.take(1)[0]
-    if flags > FITTED_MESH + ADAPTIVE_ORDER or flags & ADAPTIVE_MESH and flags & FITTED_MESH:
+    if flags > FITTED_MESH + ADAPTIVE_ORDER or (flags & ADAPTIVE_MESH and flags & FITTED_MESH):
         raise cursor.corrupt(f"flags {flags} are unknown")
     points, own = _decode_mesh(cursor.block(), flags & (ADAPTIVE_MESH | FITTED_MESH), n_vertices, n_triangles)
     counts, corners = cursor.block(), cursor.rest()
