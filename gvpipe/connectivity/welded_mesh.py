@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER, FITTED_MESH = 1, 2, 4  # flags; the first and the last exclude each other
-FEW_POINTS = 1 << 13  # up to which adaptive positions open in no time
+FEW_POINTS = 1 << 14  # up to which adaptive positions open in 0.2 s, about
 WORTH_WAITING = 0.9  # of the other stream, what theirs must be beyond that
 
 
