@@ -81,6 +81,11 @@ class Settings(BaseCodec):
         return self.prediction == "blended"
 
     @property
+    def is_cheap_again(self) -> bool:
+        """Whether another encode takes little: the search for clusters takes the first one's time."""
+        return self.is_blended
+
+    @property
     def may_omit_pictures(self) -> bool:
         """Whether frames may be their prediction alone, where that is smaller."""
         return self.is_blended and self.transform == "none" and self.placement == AUTO
