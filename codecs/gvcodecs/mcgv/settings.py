@@ -82,8 +82,8 @@ class Settings(BaseCodec):
 
     @property
     def is_cheap_again(self) -> bool:
-        """Whether another encode takes little: the search for clusters takes the first one's time."""
-        return self.is_blended
+        """Whether another encode takes little: the search for clusters takes the first one's time, but for trajectory images."""
+        return self.is_blended and self.transform == "none"
 
     @property
     def may_omit_pictures(self) -> bool:
