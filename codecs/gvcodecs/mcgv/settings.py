@@ -82,7 +82,7 @@ class Settings(BaseCodec):
 
     @property
     def is_cheap_again(self) -> bool:
-        """Whether another encode takes little: the search for clusters takes the first one's time, but for trajectory images."""
+        """Whether another encode takes little: without trajectory images, most of the first is the search for clusters."""
         return self.is_blended and self.transform == "none"
 
     @property
