@@ -121,7 +121,10 @@ def curves_plot() -> list[str]:
     """The element that ``docs/curves.js`` fills, with the addresses of its results on the site."""
     files = [path.relative_to(DOCS).as_posix() for path in curve_files()]
     text = "The plot is on the site of this documentation. Elsewhere the pictures below have the curves."
-    return [f'<div id="curves" data-files="{" ".join(files)}">{text}</div>', '<script type="module" src="../curves.js"></script>']
+    return [
+        f'<div id="curves" data-files="{" ".join(files)}">{text}</div>',
+        '<script type="module" src="../curves.js"></script>',
+    ]
 
 
 def rates_at_bound() -> list[str]:
