@@ -270,6 +270,7 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "reproduction-pca": lambda: reproduced("pca"),
     "reproduction-laplacian": lambda: reproduced("laplacian"),
     "reproduction-pdct": lambda: reproduced("pdct"),
+    "reproduction-baselines": lambda: reproduced("baselines"),
     "reproduction-systems": baselines,
     "scale-growth": growth,
     "scale-memory": memory,

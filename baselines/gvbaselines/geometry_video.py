@@ -43,7 +43,7 @@ from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.foundation.arrays import Float32, Float64, Int32
 from gvpipe.foundation.errors import InputError
 
 SIZES = (64, 128, 256)
@@ -53,6 +53,7 @@ ONE = 1 << 14  # of the square's side
 PREDICTIONS = ("affine", "none")
 STEP_PER_ERROR = 2.0  # at first; the loop around corrects it
 ENOUGH = 0.5  # part of an error that images may make which are not rounded
+PROBES = 16  # frames that tell that error
 FINEST = 0.3  # part of that error below which rounding's saves nothing
 MAX_COEFFICIENT = 2.0**30  # steps
 
@@ -88,12 +89,14 @@ class GeometryVideo(Baseline):
         places = round_places(found, mesh.n_points, ONE)
         for size, smoothness in product(SIZES, SMOOTHNESSES):
             read = read_matrix(places, ONE, size)
-            image_of = memo(f"images {size} {smoothness}", partial(fit_images, read, size, smoothness))
-            left = memo(f"left {size} {smoothness}", partial(_fitting_error, frames, image_of, read))
+            name = f"{size} {smoothness}"
+            image_of = memo(f"fit {name}", partial(fit_images, read, size, smoothness))
+            left = memo(f"left {name}", partial(_fitting_error, frames[:: -(-len(frames) // PROBES)], image_of, read))
             if left <= ENOUGH * error:
                 break
+        images = memo(f"images {name}", lambda: np.stack([image_of(frame).astype(np.float32) for frame in frames]))
         step = STEP_PER_ERROR * np.sqrt(max(error**2 - left**2, (FINEST * left) ** 2))
-        values, motions = _code_images(frames, image_of, size, step, self.prediction)
+        values, motions = _code_images(images.reshape(-1, size, size, 3), step, self.prediction)
         return b"".join(
             [
                 SIDE.pack(size),
@@ -143,13 +146,13 @@ def _fitting_error(frames: Float64, image_of: ImageOf, read: sparse.csr_array) -
     return float(np.sqrt(np.mean([np.square(read @ image_of(frame) - frame).sum(axis=1).mean() for frame in frames])))
 
 
-def _code_images(frames: Float64, image_of: ImageOf, size: int, step: float, prediction: str) -> tuple[Int32, Float64]:
-    """Rounded coefficients ``(n, size, size, 3)`` of images, and motions ``(n or 0, 4, 3)``; raises ValueError: too large."""
-    values = np.empty((len(frames), size, size, 3), np.int32)
-    motions = np.zeros((len(frames) if prediction == "affine" else 0, 4, 3))
-    image = np.zeros((size, size, 3))
-    for f, frame in enumerate(frames):
-        wanted = image_of(frame).reshape(size, size, 3)
+def _code_images(images: Float32, step: float, prediction: str) -> tuple[Int32, Float64]:
+    """Rounded coefficients of images ``(n, size, size, 3)``, and motions ``(n or 0, 4, 3)``; raises ValueError: too large."""
+    values = np.empty(images.shape, np.int32)
+    motions = np.zeros((len(images) if prediction == "affine" else 0, 4, 3))
+    image = np.zeros(images.shape[1:])
+    for f, each in enumerate(images):
+        wanted = each.astype(np.float64)
         if len(motions):
             motions[f] = _find_motion(image, wanted)
             image = _move(image, motions[f])
