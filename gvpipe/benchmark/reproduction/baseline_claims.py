@@ -11,6 +11,7 @@ from gvpipe.benchmark.reproduction.lab import Lab
 KG = "kg"
 FINE = 90.0  # a quality whose error is below those of the papers' tables
 NO_NUMBER = {
+    "afxic": "the paper is not at hand; FAMC's abstract and Figures 7 and 8 of the mcgv paper compare with it",
     "coddyac": "no text with a number of Coddyac alone is at hand; the pca paper's abstract compares with such methods",
     "gv": "the paper is not at hand; Figure 9 of the mcgv paper compares with it",
     "kglpc": "the paper is not at hand; Figure 9 of the pdct paper compares with it",
