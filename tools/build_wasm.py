@@ -90,6 +90,17 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
     "gvpipe.connectivity.visit_kernels.sort_neighbours": [NUMBERS, NUMBERS, NUMBERS],
     "gvpipe.connectivity.visit_kernels.traverse_visits": [LISTS, SCALAR, VISITS, "bool"],
     "gvpipe.connectivity.order_kernels.code_visits": [LISTS, LONGS, SCALAR, MIXING, LONGS, BYTES, "bool", LONGS],
+    "gvpipe.connectivity.candidate_kernels.code_by_candidates": [
+        LISTS,
+        LONGS,
+        SCALAR,
+        MIXING,
+        MIXING,
+        LONGS,
+        BYTES,
+        "bool",
+        LONGS,
+    ],
     "gvpipe.connectivity.position_kernels.code_positions": [ENTRIES, MIXING, LONGS, BYTES, "bool", NUMBERS],
     "gvpipe.connectivity.cell_kernels.code_cells": [
         SERIAL,

@@ -33,6 +33,8 @@ SHARED = {
     "gvpipe.attributes.value_coding": "MAX_SHIFT",
     "gvpipe.connectivity.adaptive_mesh": "MAX_POINTS",
     "gvpipe.connectivity.adaptive_order": "MAX_VERTICES",
+    "gvpipe.connectivity.candidate_kernels": "N_CONTEXTS N_GROUPS NUMBER_CONTEXTS NUMBER_GROUPS",
+    "gvpipe.connectivity.candidate_order": "MARK MAX_VERTICES",
     "gvpipe.connectivity.base_mesh": "DRACO_PREFIX MAX_PER_BYTE",
     "gvpipe.connectivity.cell_kernels": "N_CONTEXTS",
     "gvpipe.connectivity.cell_middles": "MIDDLES",

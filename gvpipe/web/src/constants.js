@@ -67,6 +67,16 @@ export const ADAPTIVE_MESH_MAX_POINTS = 32768;
 // gvpipe.connectivity.adaptive_order
 export const ADAPTIVE_ORDER_MAX_VERTICES = 65536;
 
+// gvpipe.connectivity.candidate_kernels
+export const CANDIDATE_KERNELS_N_CONTEXTS = 7;
+export const CANDIDATE_KERNELS_N_GROUPS = 5;
+export const CANDIDATE_KERNELS_NUMBER_CONTEXTS = 4;
+export const CANDIDATE_KERNELS_NUMBER_GROUPS = 2;
+
+// gvpipe.connectivity.candidate_order
+export const CANDIDATE_ORDER_MARK = 255;
+export const CANDIDATE_ORDER_MAX_VERTICES = 65536;
+
 // gvpipe.connectivity.base_mesh
 export const BASE_MESH_DRACO_PREFIX = [68, 82, 65, 67, 79, 2, 2, 1, 1, 0, 0];
 export const BASE_MESH_MAX_PER_BYTE = 1024;

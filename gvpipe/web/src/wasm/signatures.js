@@ -12,6 +12,7 @@ export const SIGNATURES = {
   sort_neighbours: {"given": ["int64[2]", "int64[2]", "int64[2]"], "returned": ["int64[1]", "int32[1]"]},
   traverse_visits: {"given": ["int64[1]", "int32[1]", "int64", "int64[1]", "int64[1]", "int64[1]", "bool"], "returned": ["int64"]},
   code_visits: {"given": ["int64[1]", "int32[1]", "int64[1]", "int64", "int64[2]", "uint8[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "uint8[1]", "bool", "int64[1]"], "returned": ["bool"]},
+  code_by_candidates: {"given": ["int64[1]", "int32[1]", "int64[1]", "int64", "int64[2]", "uint8[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[2]", "uint8[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "uint8[1]", "bool", "int64[1]"], "returned": ["bool"]},
   code_positions: {"given": ["int64[1]", "int64[1]", "int64[2]", "int64[2]", "uint8[2]", "int64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "uint8[1]", "bool", "int64[2]"], "returned": ["bool"]},
   code_cells: {"given": ["uint64[1]", "uint32[1]", "uint64[2]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "bool", "int64[4]", "int64[2]", "int64[3]", "int64[1]", "int64[3]", "int64[3]", "int64[2]", "int64[1]", "int64[2]", "int64[2]", "int64[1]", "int64[2]", "int64[1]", "int64", "int64", "int64", "bool", "bool"], "returned": ["int64[1]", "int64[2]", "int64[1]", "int64[1]"]},
   visit_corners: {"given": ["int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64[1]", "int64"], "returned": ["int64"]},
