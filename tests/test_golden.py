@@ -35,6 +35,7 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "mcgv-1-outliers": ("mcgv", {"prediction": "affine", "clusters": 1, "quality": 95, "gop": 5}),
     "mcgv-1-rigid": ("mcgv", {"segment": 20}),
     "mcgv-1-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
+    "mcgv-1-trellis": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "mcgv-1-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "pca-1-kalman": ("pca", {"quantiser": "plain", "segment": 7}),
     "pca-1-lsp": ("pca", {"predictor": "lsp"}),

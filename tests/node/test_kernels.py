@@ -66,7 +66,7 @@ def test_kernels_equal_numba_on_trajectories(name: str, tmp_path: Path) -> None:
 
 
 @NODE
-@pytest.mark.parametrize("name", ["mcgv-1-seams", "pca-1-seams", "pdct-1-seams", "mcgv-1-klt"])
+@pytest.mark.parametrize("name", ["mcgv-1-seams", "pca-1-seams", "pdct-1-seams", "mcgv-1-klt", "mcgv-1-trellis"])
 def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
     """Seams, vertex orders, adaptive positions, clips, a blend's matrix."""
     with recorded() as calls, gvpipe.open(GOLDEN / f"{name}.mp4") as video:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
 KEPT = 1 << 22  # numbers of transforms that are kept between encodes, most
+MOST_FACTORED = 2048  # rows of transforms whose errors are weighed: more take seconds, and 8 bytes times their square
 LARGE = 1 << 14  # vertices that move; fewer do not pay for other threads
 
 
@@ -53,12 +54,14 @@ class Solved:
         weights: its section.
         matrix: of the blend, ``(P, 4K)``.
         transforms: ``(4K, 3n)`` rows of equal weight, segment after segment: a list, or made one by one.
+        factor: ``(4K, 4K)`` how their errors add up (`error_kernels.error_factor`); None of many clusters.
     """
 
     fitted: Fitted
     weights: bytes
     matrix: Rows
     transforms: Iterable[Float64]
+    factor: Float64 | None
 
 
 def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
@@ -67,7 +70,7 @@ def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
     coded = {"weights": solved.weights}
     segments: list[Trajectories] = []
     for s, transforms in enumerate(solved.transforms):
-        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step)
+        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step, solved.factor)
         segments.append(decoded)
         job.report("transforms", (s + 1) / (len(bounds) - 1))
     matrix, spans = solved.matrix, halves(len(base))
@@ -92,13 +95,17 @@ def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
 
 def _solve(job: Job, start: Start, fitted: Fitted) -> Solved:
     """What a blend comes to; the last one is kept, if it does not take much, since several steps are tried with one."""
+    from gvcodecs.mcgv.motion.error_kernels import error_factor
+
     kept = job.memo("solved", list[Solved])
     if kept and kept[0].fitted is fitted:
         return kept[0]
     kept.clear()
     fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
     weights = encode_weights(fitted.weights, start.points.causal_neighbours())
-    solved = Solved(fitted, weights, as_rows(fit.matrix), _fit_segments(start, fit, 4 * fitted.n_clusters))
+    n_rows, matrix = 4 * fitted.n_clusters, as_rows(fit.matrix)
+    factor = error_factor(matrix, n_rows) if n_rows <= MOST_FACTORED else None
+    solved = Solved(fitted, weights, matrix, _fit_segments(start, fit, n_rows), factor)
     if 12 * fitted.n_clusters * start.sequence.n_frames <= KEPT and not job.is_heavy:
         solved = dataclasses.replace(solved, transforms=[*solved.transforms])
         kept.append(solved)

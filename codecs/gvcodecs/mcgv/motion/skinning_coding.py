@@ -3,7 +3,13 @@
 The transforms of a segment, in coordinates of equal weight (`skinning`), are a matrix of trajectories ``(4K, 3n)``: smooth in
 time, and alike from cluster to cluster. They are coded as such: a mean, the principal trajectories that pay
 (`gvpipe.trajectory.basis`), and their coefficients. Both with one quantisation step, that of the residual's coefficients: an
-error of either kind is an error of positions, and costs the same::
+error of either kind is an error of positions, and costs the same. The encoder has three means to a smaller section:
+
+- The mean is 0. Rows of equal weight are no points, so that their mean is no motion.
+- Principal trajectories are those of the points' displacements (`error_kernels`).
+- Both are quantised on a trellis. The rows make up for errors of those before where clusters share points.
+
+The bitstream::
 
     section = [varint] length, basis, coefficients (rows of `gvpipe.trajectory.coefficient_coding`, one block, none predicted
     from another)
@@ -28,6 +34,7 @@ from gvpipe.trajectory.basis import (
 )
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
+from gvpipe.trajectory.trellis_search import BASIS_PENALTY, PENALTY
 
 
 @dataclass(frozen=True)
@@ -51,12 +58,19 @@ class Trajectories:
         return np.asarray(sums + self.basis.mean[span])
 
 
-def encode_trajectories(rows: Float64, step: float) -> tuple[bytes, Trajectories]:
-    """Code ``rows (4K, 3n)`` with a step, model units; return the section and what the decoder will have."""
-    principal = find_principal(rows, rows.size * step * step / 12)
+def encode_trajectories(rows: Float64, step: float, factor: Float64 | None = None) -> tuple[bytes, Trajectories]:
+    """Code ``rows (4K, 3n)`` with a step, model units; return the section and, but for last bits, what the decoder will have.
+
+    ``factor (4K, 4K)`` says how errors of the rows add up (`error_kernels.error_factor`); None: each by itself.
+    """
+    from gvcodecs.mcgv.motion.error_kernels import weigh_rows
+
+    weighted = rows if factor is None else weigh_rows(factor, np.ascontiguousarray(rows))
+    principal = find_principal(weighted, rows.size * step * step / 12, is_centred=False)
     n_components = count_components(principal, len(rows), step)
-    head, basis = encode_basis(principal, n_components, len(rows), step)
-    data, decoded = encode_coefficients(fit_coefficients(rows, basis), step)
+    head, basis = encode_basis(principal, n_components, len(rows), step, penalty=BASIS_PENALTY)
+    wanted, order = fit_coefficients(rows, basis), _unpredicted(len(rows))
+    data, decoded = encode_vectors(wanted, step, order, penalty=PENALTY, factor=factor)
     return varint(len(head)) + head + data, Trajectories(basis, decoded)
 
 
@@ -72,7 +86,7 @@ def decode_trajectories(
 
 
 def encode_coefficients(coefficients: Float64, step: float) -> tuple[bytes, Float64]:
-    """Code the transforms' ``coefficients (4K, R)``; return the bytes and what the decoder will have."""
+    """Code the transforms' ``coefficients (4K, R)`` by plain rounding; return the bytes and what the decoder will have."""
     return encode_vectors(coefficients, step, _unpredicted(len(coefficients)))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gvcodecs.mcgv.motion.error_kernels import RIDGE, error_factor, weigh_rows
+from gvcodecs.mcgv.motion.skinning import Blend, Weights
 from gvcodecs.mcgv.motion.skinning_coding import decode_trajectories, encode_trajectories
 from gvpipe.foundation.errors import CorruptFile
 
@@ -17,10 +19,10 @@ def test_trajectories_round_trip(n_clusters: int, n_frames: int) -> None:
     for step in (1.0, 0.05):
         data, coded = encode_trajectories(rows, step)
         decoded = decode_trajectories(data, n_clusters, n_frames, step, "transforms.0")
-        assert np.array_equal(decoded.rows(0, n_frames), coded.rows(0, n_frames))
+        assert np.allclose(decoded.rows(0, n_frames), coded.rows(0, n_frames), rtol=0, atol=1e-9)
         assert np.allclose(decoded.rows(n_frames // 2, n_frames), coded.rows(0, n_frames)[:, 3 * (n_frames // 2) :])
         error = np.sqrt(np.square(decoded.rows(0, n_frames) - rows).mean())
-        assert error < 0.6 * step
+        assert error < 0.7 * step
         sizes.append(len(data))
     assert sizes[0] < sizes[1]
 
@@ -38,3 +40,26 @@ def test_hostile_trajectories() -> None:
     for cut in range(len(data)):
         with pytest.raises(CorruptFile):
             decode_trajectories(data[:cut], 3, 10, 0.1, "transforms.0")
+
+
+def test_errors_of_clusters_that_share_points_make_up_for_one_another() -> None:
+    draw = np.random.default_rng(1)
+    n_clusters, n_points, n_frames, step = 6, 60, 30, 0.2
+    clusters = np.stack([np.arange(n_points) % n_clusters, (np.arange(n_points) + 1) % n_clusters], axis=1)
+    weights = Weights(
+        np.pad(clusters, ((0, 0), (0, 2))).astype(np.int32), np.tile(np.array([40, 24, 0, 0], np.int32), (n_points, 1))
+    )
+    blend = Blend(draw.standard_normal((n_points, 3)), weights, n_clusters)
+    matrix, factor = blend.matrix(), error_factor(blend.rows(), 4 * n_clusters)
+    rows = np.cumsum(draw.standard_normal((4 * n_clusters, n_frames, 3)), axis=1).reshape(4 * n_clusters, -1)
+
+    assert np.array_equal(factor, np.tril(factor))
+    assert np.allclose(factor.T @ factor, (matrix.T @ matrix).toarray() + RIDGE * np.eye(len(factor)))
+    assert np.allclose(weigh_rows(factor, rows), factor @ rows)
+    sizes, errors = [], []
+    for shaping in (None, factor):
+        data, coded = encode_trajectories(rows, step, shaping)
+        sizes.append(len(data))
+        errors.append(np.square(matrix @ (coded.rows(0, n_frames) - rows)).sum())
+    assert errors[1] < 0.95 * errors[0]
+    assert sizes[1] < 1.01 * sizes[0]
