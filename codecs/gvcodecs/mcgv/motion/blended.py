@@ -22,6 +22,7 @@ from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segment_starts
 from gvpipe.foundation.arrays import Array, Float32, Float64
 from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.runtime.forks import kept
@@ -70,7 +71,7 @@ def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
     coded = {"weights": solved.weights}
     segments: list[Trajectories] = []
     for s, transforms in enumerate(solved.transforms):
-        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step, solved.factor)
+        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step, solved.factor, fitted.weights)
         segments.append(decoded)
         job.report("transforms", (s + 1) / (len(bounds) - 1))
     matrix, spans = solved.matrix, halves(len(base))
@@ -216,17 +217,17 @@ class BlendedMotion:
         kept, trajectories = self._segment
         n_frames = self._bounds[s + 1] - self._bounds[s]
         if kept != s or trajectories is None:
-            trajectories = decode_transforms(self._bitstream, self._header, s, n_frames)
+            trajectories = decode_transforms(self._bitstream, self._header, self._blend, s)
             self._segment = (s, trajectories)
         transforms = self._blend.transforms(trajectories.rows(chunk * CHUNK, min((chunk + 1) * CHUNK, n_frames)))
         return np.ascontiguousarray(transforms.reshape(*transforms.shape[:2], -1, 3).transpose(2, 0, 1, 3))
 
 
-def decode_transforms(bitstream: Bitstream, header: Header, s: int, n_frames: int) -> Trajectories:
+def decode_transforms(bitstream: Bitstream, header: Header, blend: Blend, s: int) -> Trajectories:
     """The transforms of segment s; raises `CorruptFile`."""
-    name = f"transforms.{s}"
-    section, budget = bitstream.section(name), bitstream.budget
-    return decode_trajectories(section, header.clusters, n_frames, header.transform_step, name, budget)
+    name, bounds = f"transforms.{s}", segment_starts(bitstream.n_frames, header.segments)
+    section, n_frames, step = bitstream.section(name), bounds[s + 1] - bounds[s], header.transform_step
+    return decode_trajectories(section, blend.weights, blend.n_clusters, n_frames, step, name, budget=bitstream.budget)
 
 
 def _columns(frames: Float64) -> Float64:
