@@ -36,6 +36,8 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "mcgv-1-outliers": ("mcgv", {"prediction": "affine", "clusters": 1, "quality": 95, "gop": 5}),
     "mcgv-1-rigid": ("mcgv", {"segment": 20}),
     "mcgv-1-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
+    "mcgv-1-predicted": ("mcgv", {"placement": "halves"}),
+    "mcgv-1-trellis": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "mcgv-1-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "pca-1-kalman": ("pca", {"quantiser": "plain", "segment": 7}),
     "pca-1-lsp": ("pca", {"predictor": "lsp"}),
@@ -66,6 +68,8 @@ def test_golden_file_decodes_to_the_same_positions(name: str, tmp_path: Path, re
             sequence = patched()
         elif name.endswith("-rigid"):
             sequence = held(rigid(), [4, *[1] * 59])
+        elif name.endswith("-predicted"):
+            sequence = waving(20, 24)
         elif name.endswith("-asset"):
             sequence = scene()
         if name.endswith("-live"):

@@ -130,13 +130,13 @@ def reduce_trajectories(
     return Reduced(step, data, fit_coefficients(trajectories, basis), basis)
 
 
-def find_principal(trajectories: Float64, error: float) -> Principal:
+def find_principal(trajectories: Float64, error: float, *, is_centred: bool = True) -> Principal:
     """Return the principal trajectories of ``(V, 3F)`` that matter where a squared ``error``, model units, is left anyway.
 
     From the smaller of the two Gram matrices, and only the eigenvectors wanted: on 2010 hardware the paper's full decomposition
-    took minutes, this takes a fraction of a second for 400 frames.
+    took minutes, this takes a fraction of a second for 400 frames. Not centred, their mean is left in, and 0 stands for it.
     """
-    mean = trajectories.mean(axis=0)
+    mean = trajectories.mean(axis=0) if is_centred else np.zeros(trajectories.shape[1])
     tall = is_tall(trajectories)
     if tall:  # by blocks: a copy of a million vertices' trajectories is large
         blocks = (trajectories[rows] - mean for rows in row_blocks(len(trajectories)))

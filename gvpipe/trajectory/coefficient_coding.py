@@ -27,7 +27,7 @@ import numpy as np
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.entropy.block_coder import BlockDecoder, BlockEncoder
 from gvpipe.entropy.integers import decode_integers, encode_integers
-from gvpipe.foundation.arrays import Float64, Int32, Integers
+from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, Residuals, check_residuals, context_inputs, level_of
@@ -49,8 +49,9 @@ def encode_vectors(
     beta: float = 1.8,
     given: Float64 | None = None,
     penalty: float | None = None,
+    factor: Float64 | None = None,
 ) -> tuple[bytes, Float64]:
-    """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``.
+    """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``; on a trellis but for the last bits.
 
     Args:
         target: n vectors of R components, in the order of transmission.
@@ -62,12 +63,13 @@ def encode_vectors(
             take their residuals for 0.
         penalty: of a bit, in squared fine steps, for residuals on a trellis (`gvpipe.trajectory.trellis`, ``kalman`` alone);
             None: residuals of plain rounding.
+        factor: how errors of the vectors add up, on a trellis (`gvpipe.trajectory.trellis_search.search`).
 
     Raises:
         InputError: a value is too large for the step.
     """
     if penalty is not None:
-        return _encode_trellis(target, step, causal, given, penalty)
+        return _encode_trellis(target, causal, search(target, step, causal, given, penalty, factor))
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
     wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
@@ -86,11 +88,9 @@ def encode_vectors(
     return pack_block(head) + coder.finish(), decoded
 
 
-def _encode_trellis(
-    target: Float64, step: float, causal: CausalOrder, given: Float64 | None, penalty: float
-) -> tuple[bytes, Float64]:
-    """As `encode_vectors`, on a trellis."""
-    numbers, ranked, decoded = search(target, step, causal, given, penalty)
+def _encode_trellis(target: Float64, causal: CausalOrder, found: tuple[Int64, Int64, Float64]) -> tuple[bytes, Float64]:
+    """As `encode_vectors`, of what was found on the trellis (`search`)."""
+    numbers, ranked, decoded = found
     check_residuals(ranked)
     levels = level_of(ranked)
     words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))

@@ -66,9 +66,12 @@ def test_kernels_equal_numba_on_trajectories(name: str, tmp_path: Path) -> None:
 
 
 @NODE
-@pytest.mark.parametrize("name", ["mcgv-1-seams", "pca-1-seams", "pdct-1-seams", "mcgv-1-klt", "pca-1-order"])
+@pytest.mark.parametrize(
+    "name",
+    ["mcgv-1-seams", "pca-1-seams", "pdct-1-seams", "mcgv-1-klt", "pca-1-order", "mcgv-1-predicted", "mcgv-1-trellis"],
+)
 def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
-    """Seams, vertex orders, adaptive positions, clips, a blend's matrix."""
+    """Seams, vertex orders, adaptive positions, clips, a blend's matrix and transforms."""
     with recorded() as calls, gvpipe.open(GOLDEN / f"{name}.mp4") as video:
         assert np.isfinite(video[0]).all()
     used = {each for each, *_ in calls}
@@ -76,6 +79,8 @@ def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
         assert used >= {"find_energies", "invert_factors", "blend_rows", "multiply", "weighted_sums"}
     elif name.endswith("order"):
         assert used >= {"sort_neighbours", "code_by_candidates"}
+    elif name.endswith(("predicted", "trellis")):
+        assert used >= {"code_residuals", "predict_kalman"}
     elif name.startswith("mcgv"):
         assert used >= {"order_by_corners", "code_positions", "visit_corners", "code_visits"}
     elif name.startswith("pca"):

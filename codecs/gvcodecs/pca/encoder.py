@@ -36,9 +36,9 @@ from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
 from gvpipe.trajectory.coefficient_coding import encode_vectors
 from gvpipe.trajectory.prediction import PREDICTORS
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
+from gvpipe.trajectory.trellis_search import BASIS_PENALTY, PENALTY
 
 QUANTISERS = ("trellis", "plain")
-BASIS_PENALTY, PENALTY = 0.25, 0.22  # of a bit on a trellis, in squared fine steps (`gvpipe.trajectory.trellis_search`)
 NOISE, COST = 1.15, 0.22  # on a trellis: squared error in that of rounding to the step; of a component (`count_components`)
 LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
 

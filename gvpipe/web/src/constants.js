@@ -404,9 +404,16 @@ export const KD_TREE_MAX_COORDINATE = 1048576;
 export const BLEND_KERNELS_FLAT = 1e-06;
 export const BLEND_KERNELS_LEAST_ENERGY = 1e-09;
 
+// gvcodecs.mcgv.motion.row_neighbours
+export const ROW_NEIGHBOURS_MOST = 8;
+export const ROW_NEIGHBOURS_VARIANCE = 0.003;
+
 // gvcodecs.mcgv.motion.skinning
 export const SKINNING_INFLUENCES = 4;
 export const SKINNING_TOTAL = 64;
+
+// gvcodecs.mcgv.motion.skinning_coding
+export const SKINNING_CODING_PREDICTED = 0;
 
 // gvcodecs.mcgv.motion.weight_coding
 export const WEIGHT_CODING_COUNT_CONTEXTS = 4;
