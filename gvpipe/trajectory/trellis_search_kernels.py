@@ -51,8 +51,10 @@ class Paths(NamedTuple):
 
 
 @compiled
-def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float) -> Int64:
-    """Fill ``coding.residuals (m, R)`` and ``coding.decoded``; return the integers k ``(m, R)``.
+def search_paths(
+    coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float, begin: int, end: int, found: Int64
+) -> None:
+    """Fill ``coding.residuals (m, R)``, ``coding.decoded`` and ``found (m, R)``, the integers k, of ranks ``begin`` to ``end``.
 
     Args:
         coding: ``step`` is the fine one.
@@ -60,9 +62,9 @@ def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty
         prices: ``(54, N_PRICED)`` bits.
         penalty: of a bit.
     """
-    n_ranks, n_components = coding.residuals.shape
-    paths, found = _empty_paths(n_components, most_neighbours(coding)), np.zeros((n_ranks, n_components), np.int64)
-    for rank in range(n_ranks):
+    n_components = coding.residuals.shape[1]
+    paths = _empty_paths(n_components, most_neighbours(coding))
+    for rank in range(begin, end):
         n = _begin(coding, rank, paths)
         for c in range(n_components):
             variance = _predict(coding, rank, c, n, paths)
@@ -78,7 +80,6 @@ def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty
             coding.decoded[coding.causal.order[rank], c] = paths.values[c, state]
             state = paths.before[c, state]
             coding.residuals[rank, c] = residual_of(number, state)
-    return found
 
 
 @compiled
@@ -126,7 +127,7 @@ def _predict(coding: VectorCoding, rank: int, c: int, n: int, paths: Paths) -> f
             store(own, k * width + at, column)
             store(following, at, load(following, at) + column * value)
     store(paths.guesses, 0, guesses)
-    variance = coding.step * coding.step
+    variance = coding.noises[c]
     for j in range(n):
         variance += (1 + DOUBT) * following[j] * near[j]
     inverse = same(1 / variance)
