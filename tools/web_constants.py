@@ -84,7 +84,8 @@ SHARED = {
     "gvpipe.trajectory.contexts": "PER_OCTAVE MAX_LEVEL N_CONTEXTS",
     "gvpipe.trajectory.prediction": "PREDICTORS",
     "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
-    "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS MORE_NEIGHBOURS VARIANCE MORE_VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
+    "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS MORE_NEIGHBOURS VARIANCE MORE_VARIANCE MIN_BLOCK "
+    "CUBIC LINEAR OFFSETS",
     "gvpipe.trajectory.trellis": "FINENESS ZEROS SHAPES GRADES FINDS_NOISES FALL LEAST_GRADE",
     "gvcodecs.laplacian.average_coding": "NAME SPACING FARTHEST",
     "gvcodecs.laplacian.anchors": "ANCHOR_CHOICES",

@@ -14,8 +14,8 @@ which picks one of `N_CONTEXTS` frequency tables::
               (`gvpipe.entropy.block_coder`): for every block of vectors, every component's residuals
     level   = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
 
-Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] flags, then words;
-its tables learn (`gvpipe.trajectory.trellis_coding`).
+Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] flags, then
+words; its tables learn (`gvpipe.trajectory.trellis_coding`).
 """
 
 from __future__ import annotations

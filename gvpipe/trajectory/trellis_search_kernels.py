@@ -127,7 +127,7 @@ def _predict(coding: VectorCoding, rank: int, c: int, n: int, paths: Paths) -> f
             store(own, k * width + at, column)
             store(following, at, load(following, at) + column * value)
     store(paths.guesses, 0, guesses)
-    variance = coding.noises[c]
+    variance: float = coding.noises[c]
     for j in range(n):
         variance += (1 + DOUBT) * following[j] * near[j]
     inverse = same(1 / variance)
