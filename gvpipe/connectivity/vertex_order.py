@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph
 
 REACH = 256  # most vertices that one search looks at: 1024 saves 0.3 bit per vertex on samba, and takes twice the time
-MAX_VERTICES = (1 << 24) - 1  # constriction's largest uniform alphabet
+MAX_VERTICES = (1 << 24) - 1  # the range coder's largest uniform alphabet
 
 
 def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
@@ -34,9 +34,9 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
 
     `points` (V, 3) int, lattice units, and `faces` (T, 3) int are the mesh in the codec's order.
     """
-    import constriction
-
     from gvpipe.connectivity.visit_kernels import CodedVisits, traverse_visits
+    from gvpipe.entropy.range_decoder import edges_of_weights
+    from gvpipe.entropy.range_encoder import RangeEncoder
 
     n_vertices = len(points)
     if n_vertices > MAX_VERTICES:
@@ -46,14 +46,13 @@ def encode_order(visits: Array, points: Array, faces: Array) -> bytes:
 
     symbols, low, sizes = split_ranks(coded.ranks, coded.jumps)
     table = quantised(np.bincount(symbols, minlength=N_SYMBOLS))
-    coder = constriction.stream.queue.RangeEncoder()
+    coder = RangeEncoder()
     if n_vertices:
-        coder.encode(symbols, constriction.stream.model.Categorical(weights_of(table), perfect=False))
+        coder.encode(symbols, edges_of_weights(weights_of(table)))
     has_low = sizes > 1
     if has_low.any():
-        coder.encode(low[has_low], constriction.stream.model.Uniform(), sizes[has_low])
-    words: Array = coder.get_compressed()
-    return bytes(table.tobytes() + words.astype("<u4").tobytes())
+        coder.encode_uniform(low[has_low], sizes[has_low])
+    return table.tobytes() + coder.finish().astype("<u4").tobytes()
 
 
 def decode_order(data: bytes, lists: NeighbourLists) -> Array:

@@ -20,7 +20,7 @@ import numpy as np
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.open_stream import open_stream
-from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, check_sizes, model
+from gvpipe.entropy.tokens import CHUNK, MAX_BITS, MAX_TOKENS, TABLE_TOTAL, check_sizes
 from gvpipe.foundation.arrays import Int64, Integers, UInt8, UInt32, UInt64
 from gvpipe.foundation.elementary import log2
 
@@ -53,26 +53,28 @@ class BlockEncoder:
 
     def finish(self) -> bytes:
         """Return the stream of all blocks."""
-        import constriction
+        from gvpipe.entropy.range_decoder import edges_of
+        from gvpipe.entropy.range_encoder import RangeEncoder
 
-        head, models = [varint(self._n_contexts)], []
+        head, edges = [varint(self._n_contexts)], []
         for counts in self._counts:
             described, table = _describe(counts)
             head.append(described)
-            models.append(model(table) if len(table) > 1 else None)  # None: nothing to code
-        coder = constriction.stream.queue.RangeEncoder()
+            edges.append(edges_of(table) if len(table) > 1 else None)  # None: nothing to code
+        coder = RangeEncoder()
         for groups, low, n_low in self._blocks:
             for context, tokens in groups:
-                if models[context] is not None:
-                    coder.encode(tokens.astype(np.int32), models[context])
+                own = edges[context]
+                if own is not None:
+                    coder.encode(tokens, own)
             for shift in range(0, MAX_BITS, CHUNK):
                 more = n_low > shift
                 if not more.any():
                     break
                 sizes = 1 << np.minimum(n_low[more].astype(np.int64) - shift, CHUNK)
                 pieces = (low[more] >> shift) & (sizes - 1)
-                coder.encode(pieces.astype(np.int32), constriction.stream.model.Uniform(), sizes.astype(np.int32))
-        return b"".join([*head, coder.get_compressed().astype("<u4").tobytes()])
+                coder.encode_uniform(pieces, sizes)
+        return b"".join([*head, coder.finish().astype("<u4").tobytes()])
 
 
 class BlockDecoder:

@@ -1,8 +1,8 @@
 """Range coding of integer arrays.
 
 What: signed integers, grouped by context, become bytes; each context has its own frequency table.
-Why: the coders that constriction offers are exact where their models are, so all models here are tables of integers,
-sent with the data; no probability is ever computed from a formula.
+Why: a range coder is exact where its models are, so all models here are tables of integers, sent with the data; no
+probability is ever computed from a formula.
 
 A value ``x`` is folded to ``u = 2x`` (x >= 0) or ``-2x - 1`` (x < 0). ``u < 16`` is its own token; above that, the token
 signals the bit length of ``u`` and its second highest bit, and the bits below follow raw::
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.entropy.grouping import group_by_context
-from gvpipe.entropy.tokens import DIRECT, MAX_TOKENS, TABLE_TOTAL, model, tokenise, untokenise
+from gvpipe.entropy.tokens import DIRECT, MAX_TOKENS, TABLE_TOTAL, tokenise, untokenise
 from gvpipe.foundation.arrays import Int64, Integers
 
 MAX_CONTEXTS = 1 << 16
@@ -43,19 +43,20 @@ def encode_integers(values: Integers, contexts: Integers | None = None) -> bytes
     Raises:
         ValueError: a value is too large.
     """
-    import constriction
+    from gvpipe.entropy.range_decoder import edges_of
+    from gvpipe.entropy.range_encoder import RangeEncoder
 
     tokens, extra, n_extra = tokenise(np.asarray(values, np.int64).ravel())
     groups = _groups(contexts, tokens.size)
-    encoder = constriction.stream.queue.RangeEncoder()
+    encoder = RangeEncoder()
     head = [varint(len(groups))]
     for group in groups:
         counts = np.bincount(tokens[group])
         table = np.where(counts > 0, np.maximum(1, counts * TABLE_TOTAL // max(1, len(group))), 0)
         head.append(varint(len(table)) + b"".join(varint(int(f)) for f in table))
         if len(table) > 1:
-            encoder.encode(tokens[group].astype(np.int32), model(table))
-    words = encoder.get_compressed().astype("<u4")
+            encoder.encode(tokens[group], edges_of(table))
+    words = encoder.finish().astype("<u4")
     return b"".join([*head, varint(len(words)), words.tobytes(), _pack_bits(tokens, extra, n_extra)])
 
 

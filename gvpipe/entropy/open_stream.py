@@ -27,10 +27,7 @@ def open_stream(cursor: Cursor, tables: Sequence[Int64]) -> BlockStream:
     from gvpipe.entropy import range_decoder
     from gvpipe.entropy.block_kernels import BlockStream
 
-    sizes = np.array([len(table) for table in tables], np.int64)
-    edges = np.zeros((len(tables), int(sizes.max(initial=0)) + 1), np.uint64)
-    for own, table in zip(edges, tables, strict=True):
-        own[: len(table) + 1] = range_decoder.edges_of(table)
+    edges, sizes = range_decoder.edges_of_all(tables)
     if cursor.left % 4:
         raise cursor.corrupt("its words are not whole")
     words = cursor.array("<u4", cursor.left // 4).astype(np.uint32)

@@ -1,8 +1,8 @@
-"""Range decoding inside compiled loops, as constriction's `RangeDecoder` does it: 32-bit words, 64-bit state, 24-bit precision.
+"""Range decoding inside compiled loops: 32-bit words, 64-bit state, 24-bit precision.
 
-Why: `gvpipe.entropy.block_coder` asks for a few values at a time, whose contexts depend on those before. A call of the library
+Why: `gvpipe.entropy.block_coder` asks for a few values at a time, whose contexts depend on those before. A call of a library
 for each of these costs far more than what it decodes: samba's blended motion opens four times as fast with these loops.
-Blocks of a few integers (`gvpipe.entropy.integers`) are decoded here, too. Encoding stays with the library.
+The words are those of the library constriction, `RangeEncoder` and `RangeDecoder`, which the tests compare with.
 
 A state is ``(3,) uint64``: point minus lower end, range, and the place of the next word.
 
@@ -13,6 +13,7 @@ Source: Bamler, "Understanding Entropy Coding With Asymmetric Numeral Systems", 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -40,8 +41,17 @@ def may_be_exhausted(state: UInt64, words: UInt32) -> bool:
 
 
 def edges_of(table: Int64) -> UInt64:
-    """`edges_of_weights` of frequencies ``(n,)``, which constriction is given as shares of their sum."""
+    """`edges_of_weights` of frequencies ``(n,)``, as shares of their sum."""
     return _edges(table.tobytes())
+
+
+def edges_of_all(tables: Sequence[Int64]) -> tuple[UInt64, Int64]:
+    """``(C, N + 1)`` edges of C tables of frequencies, of at most N symbols, and ``(C,)`` how many symbols each has."""
+    sizes = np.array([len(table) for table in tables], np.int64)
+    edges = np.zeros((len(tables), int(sizes.max(initial=0)) + 1), np.uint64)
+    for own, table in zip(edges, tables, strict=True):
+        own[: len(table) + 1] = edges_of(table)
+    return edges, sizes
 
 
 @functools.lru_cache(KEPT)
@@ -50,16 +60,18 @@ def _edges(table: bytes) -> UInt64:
     frequencies = np.frombuffer(table, np.int64)
     if not len(frequencies):
         return np.zeros(1, np.uint64)
+    # integer / integer is one correctly rounded operation: the same on every machine
     edges = edges_of_weights(frequencies.astype(np.float64) / float(frequencies.sum()))
     edges.flags.writeable = False
     return edges
 
 
 def edges_of_weights(weights: Float64) -> UInt64:
-    """``(n + 1,)`` edges of constriction's ``Categorical(weights, perfect=False)``: every symbol gets one share of 2**24, the
-    rest is dealt out in proportion, rounded down at the edges.
+    """``(n + 1,)`` edges of symbols with these ``weights (n,)``: every symbol gets one share of 2**24, the rest is dealt out in
+    proportion, rounded down at the edges.
 
-    Sums in order, one quotient and one product per edge in doubles: the same on every machine.
+    constriction calls it ``Categorical(weights, perfect=False)``. Sums in order, one quotient and one product per edge in
+    doubles: the same on every machine.
     """
     before = np.concatenate([[0.0], np.cumsum(weights)])
     edges = np.zeros(len(weights) + 1, np.uint64)
@@ -122,7 +134,7 @@ def decode_bits(state: UInt64, words: UInt32, width: int) -> int | np.int64:
 
 @compiled
 def decode_uniform(state: UInt64, words: UInt32, size: int) -> int | np.int64:
-    """The next of ``size`` values, 1..2**24, all alike, as constriction's ``Uniform``; -1 as for `decode_symbol`."""
+    """The next of ``size`` values, 1..2**24, all alike; -1 as for `decode_symbol`."""
     scale = state[1] >> SHIFT
     quantile = state[0] // scale
     if quantile >= np.uint64(TOTAL):

@@ -10,14 +10,12 @@ the value is noted with its context, when decoding, it is read. So encoder and d
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.serial_tables import bits_of, read_tables, write_tables
-from gvpipe.entropy.tokens import CHUNK, MAX_TOKENS, model, tokenise
+from gvpipe.entropy.tokens import MAX_TOKENS, tokenise
 from gvpipe.foundation.arrays import Int64
 
 
@@ -90,25 +88,16 @@ def encode_serial(values: Int64, contexts: Int64, n_contexts: int) -> bytes:
         >>> len(encode_serial(np.array([0, 0, 0]), np.array([0, 0, 1]), 2))
         6
     """
-    import constriction
+    from gvpipe.entropy import range_decoder, range_encoder
+    from gvpipe.entropy.block_kernels import BlockStream
+    from gvpipe.entropy.serial_kernels import encode_tokens
 
     tokens, low, n_low = tokenise(values)
-    counts = _count_tokens(tokens, contexts, n_contexts)
-    head, tables = write_tables(counts)
-    models: list[Any] = [model(table) if len(table) > 1 else None for table in tables]
-    coder = constriction.stream.queue.RangeEncoder()
-    uniform = {width: constriction.stream.model.Uniform(1 << width) for width in range(1, CHUNK + 1)}
-    ends = np.flatnonzero((np.diff(contexts, append=-1) != 0) | (n_low > 0)) + 1  # runs that the library takes at once
-    for begin, end in zip((ends - np.diff(ends, prepend=0)).tolist(), ends.tolist(), strict=True):
-        context = int(contexts[begin])
-        if models[context] is not None:
-            coder.encode(tokens[begin:end].astype(np.int32), models[context])
-        left, bits = int(n_low[end - 1]), int(low[end - 1])
-        while left:
-            width = min(left, CHUNK)
-            coder.encode(bits & ((1 << width) - 1), uniform[width])
-            bits, left = bits >> width, left - width
-    return head + bytes(coder.get_compressed().astype("<u4").tobytes())
+    head, tables = write_tables(_count_tokens(tokens, contexts, n_contexts))
+    words = np.zeros(range_encoder.MOST_WORDS * len(values), np.uint32)
+    stream = BlockStream(range_encoder.start(), words, *range_decoder.edges_of_all(tables))
+    encode_tokens(stream, contexts, tokens, low, n_low)
+    return head + range_encoder.finish(stream.state, words).astype("<u4").tobytes()
 
 
 def estimate_bytes(values: Int64, contexts: Int64, n_contexts: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from gvpipe.entropy.block_kernels import NO_DATA, NO_TABLE, OUT_OF_RANGE, BlockStream
 from gvpipe.entropy.range_decoder import decode_bits, decode_symbol
+from gvpipe.entropy.range_encoder import encode_bits, encode_symbols
 from gvpipe.entropy.tokens import CHUNK, DIRECT
 from gvpipe.foundation.arrays import Int64
 from gvpipe.runtime.compiled import compiled
@@ -33,6 +34,18 @@ class SerialCoder(NamedTuple):
 def empty_stream() -> BlockStream:
     """The stream of an encoder, which reads nothing."""
     return BlockStream(np.zeros(3, np.uint64), np.zeros(0, np.uint32), np.zeros((0, 1), np.uint64), np.zeros(0, np.int64))
+
+
+@compiled
+def encode_tokens(stream: BlockStream, contexts: Int64, tokens: Int64, low: Int64, n_low: Int64) -> None:
+    """Write n values: ``tokens (n,)`` in ``contexts (n,)``, each followed by the ``n_low (n,)`` bits of ``low (n,)``."""
+    for i in range(len(tokens)):
+        context = contexts[i]
+        if stream.sizes[context] > 1:
+            encode_symbols(stream.state, stream.words, stream.edges[context], tokens[i : i + 1])
+        for shift in range(0, n_low[i], CHUNK):
+            width = min(n_low[i] - shift, CHUNK)
+            encode_bits(stream.state, stream.words, low[i] >> shift & (1 << width) - 1, width)
 
 
 @compiled

@@ -6,8 +6,6 @@ signals the bit length of ``u`` and its second highest bit; the bits below follo
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gvpipe.container.cursor import Cursor
@@ -19,14 +17,6 @@ MAX_BITS = 40  # bit length of the largest u
 MAX_TOKENS = DIRECT + 2 * (MAX_BITS - 4)
 N_EXTRA = np.maximum((np.arange(MAX_TOKENS) - DIRECT) // 2 + 3, 0) * (np.arange(MAX_TOKENS) >= DIRECT)  # low bits of each token
 CHUNK = 16  # low bits that the range coder takes at a time
-
-
-def model(table: Int64) -> Any:
-    """The library's model of a table of frequencies, two at least."""
-    import constriction
-
-    # integer / integer is one correctly rounded operation: the same on every machine
-    return constriction.stream.model.Categorical(table.astype(np.float64) / float(table.sum()), perfect=False)
 
 
 def check_sizes(values: Integers) -> None:

@@ -30,7 +30,6 @@ REQUIREMENTS = (
     "llvmlite",
     "av>=18",
     "DracoPy>=2",
-    "constriction>=0.4,<0.5",
     "threadpoolctl>=3.5",
     "pillow>=10.1",
     "trimesh>=4.6.1",

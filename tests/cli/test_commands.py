@@ -27,7 +27,7 @@ from gvpipe.foundation.errors import CorruptFile, FormatError, NotGeometryVideo,
 from gvpipe.model.sequence import MeshSequence
 
 FAST = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")
-HEAVY = ("numpy", "scipy", "cv2", "av", "numba", "trimesh", "xatlas", "DracoPy", "constriction", "PIL")
+HEAVY = ("numpy", "scipy", "cv2", "av", "numba", "trimesh", "xatlas", "DracoPy", "PIL")
 ENCODE_KEYS = {"codec", "settings", "vertices", "triangles", "frames", "fps", "bytes", "bpvf", "seconds"}
 COMPARE_KEYS = {"rmse", "rmse_diag", "max", "max_diag", "kg", "da", "sted", "hausdorff", "frames"}
 OLD = b"an older file"

@@ -15,6 +15,28 @@ def test_nothing_takes_no_words() -> None:
     assert len(range_encoder.finish(range_encoder.start(), np.zeros(4, np.uint32))) == 0
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_library_reads_what_the_encoder_writes(seed: int) -> None:
+    """Symbols of any tables and values of any sizes in turn; the encoder's room grows on the way."""
+    constriction = pytest.importorskip("constriction")
+    rng = np.random.default_rng(seed)
+    coder, written = range_encoder.RangeEncoder(), []
+    for size in rng.integers(2, 88, 12).tolist():
+        counts = rng.integers(0, 4097, size) * (rng.random(size) < 0.8) + 1
+        symbols = rng.choice(size, int(rng.integers(0, 200)), p=counts / counts.sum())
+        sizes = rng.integers(1, 1 << int(rng.integers(1, 25)), len(symbols))
+        values = rng.integers(0, sizes)
+        coder.encode(symbols, range_decoder.edges_of(counts))
+        coder.encode_uniform(values, sizes)
+        written.append((counts, symbols, sizes, values))
+    decoder = constriction.stream.queue.RangeDecoder(coder.finish())
+    for counts, symbols, sizes, values in written:
+        model = constriction.stream.model.Categorical(counts.astype(float) / float(counts.sum()), perfect=False)
+        assert (decoder.decode(model, len(symbols)) == symbols).all()
+        for value, size in zip(values.tolist(), sizes.tolist(), strict=True):
+            assert size == 1 or decoder.decode(constriction.stream.model.Uniform(size)) == value
+
+
 @pytest.mark.parametrize("last", [1, 1 << 12, (1 << 24) - 3])
 def test_carries_go_back_into_words(last: int) -> None:
     """The last of three symbols has most of the interval's upper end: long runs of words of ones, then a carry."""

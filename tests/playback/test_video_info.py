@@ -23,7 +23,7 @@ from gvpipe.container.outline import Outline
 from gvpipe.foundation.errors import CorruptFile
 from gvpipe.model.sequence import MeshSequence
 
-DECODERS = ("scipy", "numba", "cv2", "gvcodecs", "trimesh", "DracoPy", "constriction")
+DECODERS = ("scipy", "numba", "cv2", "gvcodecs", "trimesh", "DracoPy")
 
 
 def without_box(info: gvpipe.Info) -> dict[str, Any]:

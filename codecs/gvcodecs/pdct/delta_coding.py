@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gvpipe.container.cursor import Cursor, varint
-from gvpipe.entropy.range_decoder import start
-from gvpipe.entropy.tokens import model, tokenise
-from gvpipe.foundation.arrays import Float64, Int64, UInt8, UInt32
+from gvpipe.entropy.range_decoder import edges_of, start
+from gvpipe.entropy.tokens import tokenise
+from gvpipe.foundation.arrays import Float64, Int64, UInt8
 from gvpipe.foundation.elementary import log2
 
 if TYPE_CHECKING:
@@ -38,12 +38,11 @@ class DeltaEncoder:
     """Collects frames of delta coefficients of one clip, and learns from them as the decoder does."""
 
     def __init__(self, layout: Layout) -> None:
-        import constriction
-
         from gvcodecs.pdct.delta_kernels import start_learning
+        from gvpipe.entropy.range_encoder import RangeEncoder
 
         self._layout, self._learning = layout, start_learning(layout)
-        self._coder = constriction.stream.queue.RangeEncoder()
+        self._coder = RangeEncoder()
         self._raw: list[UInt8] = []
 
     @property
@@ -77,13 +76,13 @@ class DeltaEncoder:
         for axis in range(3):
             tokens, extra, n_extra = tokenise(values[axis])
             for context, where in _groups(contexts[axis]):
-                self._coder.encode(tokens[where].astype(np.int32), model(self._learning.counts[context]))
+                self._coder.encode(tokens[where], edges_of(self._learning.counts[context]))
             self._raw.append(((np.repeat(extra, n_extra) >> _shifts(n_extra)) & 1).astype(np.uint8))
         learn_frame(self._layout, self._learning, contexts, values)
 
     def finish(self) -> bytes:
         """Return the section."""
-        words: UInt32 = self._coder.get_compressed().astype("<u4")
+        words = self._coder.finish().astype("<u4")
         raw = np.packbits(np.concatenate(self._raw)).tobytes() if self._raw else b""
         return varint(len(words)) + words.tobytes() + raw
 

@@ -249,7 +249,7 @@ def _take_axis(counts: Int64, stream: DeltaStream, contexts: Int64, values: Int6
 
 @compiled
 def _find_edges(counts: Int64, edges: UInt64) -> None:
-    """Fill ``edges (tokens + 1,)`` of constriction's model of ``counts``; as `gvpipe.entropy.range_decoder.edges_of`."""
+    """Fill ``edges (tokens + 1,)`` of ``counts``, as `gvpipe.entropy.range_decoder.edges_of`."""
     n, total = len(counts), float(counts.sum())
     sum_of_weights = 0.0
     for token in range(n):

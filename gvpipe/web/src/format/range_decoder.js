@@ -1,7 +1,6 @@
 /**
- * Range decoding as the Rust and Python library constriction does it (`RangeDecoder`: 32-bit words, 64-bit state, 24-bit
- * precision), which gvpipe's files are coded with. constriction exists for neither JavaScript nor npm, so the decoder's three
- * rules are written out here; encoding, and all else that the library offers, stays with it.
+ * Range decoding: 32-bit words, 64-bit state, 24-bit precision, as `gvpipe/entropy/range_decoder.py`. The words are those of the
+ * library constriction, which exists for neither JavaScript nor npm.
  *
  * Of the decoder's state only the difference between point and lower end matters, so (difference, range) are kept, each as two
  * halves of 32 bits in doubles: exact, and far faster than BigInt.

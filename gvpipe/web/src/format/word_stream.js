@@ -28,8 +28,8 @@ export class WordStream {
 }
 
 /**
- * The edges of constriction's `Categorical(weights, perfect=False)`: every symbol gets one share of 2^24, the rest is dealt out
- * in proportion, rounded down at the edges. Sums, one quotient and one product per edge in doubles: the same on every machine.
+ * The edges of symbols with these weights: every symbol gets one share of 2^24, the rest is dealt out in proportion, rounded
+ * down at the edges. Sums, one quotient and one product per edge in doubles: the same on every machine.
  */
 export function categoricalEdges(weights) {
   let sum = 0;
