@@ -8,6 +8,8 @@ energy l_k and of basis vectors of energy 1; the basis is scaled by sqrt(l_k) be
 of D in either factor costs the same (reverse water-filling). Both factors are coded as feature vectors (`coefficient_coding`):
 the coefficients along the surface, the basis along time (`temporal_neighbours`). The mean is one more column, of scale sqrt(V).
 
+A caller may let the basis err more (``coarseness``): the scales are smaller, and the decoder need not know.
+
 Components are kept while they pay: l_k > THRESHOLD (V + 3F) D^2. D is such that the error comes to what is wanted, also
 where a component leaves. After coding, coefficients are fitted anew to the decoded basis, so that what its errors span is not
 lost.
