@@ -6,7 +6,8 @@
 import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
-import { inflateSync } from "node:zlib";
+import { inflateRawSync, inflateSync } from "node:zlib";
+import { PLAIN_DICTIONARY, PLAIN_VERSION } from "../gvpipe/web/src/constants.js";
 
 const MOST_VALUES = 2 ** 22; // coordinates that are read of a file
 const UUID = Buffer.from("6a1f0c523d7b4e0e9c5567e4f0a7d1b9", "hex");
@@ -56,17 +57,32 @@ delete globalThis.process; // Draco's wrapper then takes this for a page
 globalThis.window = globalThis;
 const { GeometryVideo, GeometryVideoError } = await import(pathToFileURL(process.argv[2]));
 
+function plainHeader(file, start) {
+  let [length, at, shift] = [0, start, 0];
+  do {
+    length |= (file[at] & 127) << shift;
+    shift += 7;
+  } while (file[at++] > 127);
+  return inflateRawSync(file.subarray(at, at + length), { dictionary: Uint8Array.from(PLAIN_DICTIONARY) });
+}
+
+function sizeIn(text) {
+  const { width, height } = JSON.parse(text).settings;
+  return width * height <= 2 ** 24 ? [width, 3 * height] : [16, 16];
+}
+
 /** Of a picture, as the header has it; [16, 16] where it has none. */
 function pictureSize(file) {
   try {
     const isStream = file.includes(INDEX_UUID);
+    const content = file.lastIndexOf(UUID) + UUID.length;
+    if (!isStream && file[content] === PLAIN_VERSION) return sizeIn(plainHeader(file, content + 1));
     const at = (isStream ? file.indexOf(INDEX_UUID) : file.lastIndexOf(UUID)) + 28; // behind the magic, the version and the count
     const name = at + 1 + file[at]; // of the first section, the header
     const length = Number(file.readBigUInt64LE(name));
     let start = isStream ? Number(file.readBigUInt64LE(name + 12)) : at + 4;
     if (!isStream) for (let i = file.readUInt16LE(at - 2), row = at; i > 0; i--, row += 1 + file[row] + 12) start += 1 + file[row] + 12;
-    const { width, height } = JSON.parse(inflateSync(file.subarray(start, start + length))).settings;
-    return width * height <= 2 ** 24 ? [width, 3 * height] : [16, 16];
+    return sizeIn(inflateSync(file.subarray(start, start + length)));
   } catch {
     return [16, 16];
   }

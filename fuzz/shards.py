@@ -20,9 +20,10 @@ from fuzz.parts import BrokenPromise, Parts, Seed, Target
 from fuzz.results import check_faces, check_positions
 from gvpipe import datasets
 from gvpipe.container import bare
-from gvpipe.container.bare import DICTIONARY, MAGIC, NO_TRACKS, PREFIX, RAW
+from gvpipe.container.bare import DICTIONARY, MAGIC, NO_TRACKS, PREFIX
 from gvpipe.container.bitstream import CHECKSUM, HEADER, VERSION
 from gvpipe.container.boxes import uuid_head
+from gvpipe.container.compact_header import RAW
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.mp4 import BOX_UUID, file_bytes, read_file
 from gvpipe.container.shared_sections import section_hash

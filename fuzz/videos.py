@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
+import re
 import struct
 import zlib
 from collections.abc import Callable, Mapping
@@ -19,7 +21,11 @@ from fuzz.mutation import mutate_bytes, mutate_json
 from fuzz.parts import Parts, Seed, Target
 from fuzz.results import check_asset, check_faces, check_positions, check_text
 from gvpipe.container.bitstream import CHECKSUM, ENTRY, HEADER, MAGIC, PREFIX, VERSION
+from gvpipe.container.compact_header import RAW
+from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.mp4 import BOX_UUID
+from gvpipe.container.plain import DICTIONARY, TAIL
+from gvpipe.container.plain import VERSION as PLAIN_VERSION
 from gvpipe.foundation.errors import FormatError
 from gvpipe.playback.player import Player
 from gvpipe.playback.video_info import info
@@ -27,7 +33,9 @@ from gvpipe.playback.video_info import info
 FILE = "case.mp4"
 VIDEO = "(video)"
 JSON = "(header)"
-TABLE = "(table)"  # of sections, where it was changed itself
+TABLE = "(table)"  # of sections, where it was changed itself; in container version 2, the header that has one
+PLAIN = "(plain)"  # of container version 2: the checksum of the video's description
+TAG = re.compile(rb"gvpipe 2 ([0-9a-f]{32})")
 MOST_VALUES = 1 << 22  # coordinates that are read of a case
 GROUPS = {  # sections of one parser: those whose names begin so
     "connectivity": ("mesh", "order", "still"),
@@ -50,6 +58,8 @@ def split_video(data: bytes) -> Parts:
     """A sound geometry video in parts."""
     end = data.rindex(BOX_UUID.bytes) - 8
     payload = data[end + 24 :]
+    if not payload.startswith(MAGIC):
+        return {VIDEO: data[:end], **_split_plain(payload)}
     position = len(MAGIC)
     _, count = PREFIX.unpack_from(payload, position)
     position += PREFIX.size
@@ -68,11 +78,23 @@ def split_video(data: bytes) -> Parts:
     return {JSON: json.dumps(header).encode(), **parts}
 
 
+def _split_plain(payload: bytes) -> Parts:
+    cursor = Cursor(payload[1:-TAIL], HEADER)
+    header = zlib.decompressobj(RAW, zdict=DICTIONARY).decompress(cursor.block())
+    sections = {name: cursor.take(length) for name, length in json.loads(header)["sections"].items()}
+    return {JSON: json.dumps(json.loads(header)).encode(), PLAIN: payload[-CHECKSUM.size - 4 : -CHECKSUM.size], **sections}
+
+
 def join_video(parts: Parts) -> dict[str, bytes]:
     """The file of some parts: checksums, lengths, the content id and the checksum of the video are made here."""
-    sections = {name: data for name, data in parts.items() if name not in (VIDEO, JSON, TABLE)}
+    sections = {name: data for name, data in parts.items() if name not in (VIDEO, JSON, TABLE, PLAIN)}
     video, identity = parts[VIDEO], _content_id(sections)
     header = parts[JSON]
+    if PLAIN in parts:
+        payload = _join_plain(video, parts, sections)
+        tag = TAG.search(video)
+        video = video.replace(tag[1], identity.encode()) if tag else video
+        return {FILE: video + _boxed(payload)}
     try:
         tree = json.loads(header)
         container = tree["container"]
@@ -85,7 +107,24 @@ def join_video(parts: Parts) -> dict[str, bytes]:
     rows = (_row(name.encode(), len(data), zlib.crc32(data)) for name, data in packed.items())
     table = parts.get(TABLE) or MAGIC + PREFIX.pack(VERSION, len(packed)) + b"".join(rows)
     payload = b"".join([table, CHECKSUM.pack(zlib.crc32(table)), *packed.values()])
-    return {FILE: video + struct.pack(">I", 24 + len(payload)) + b"uuid" + BOX_UUID.bytes + payload}
+    return {FILE: video + _boxed(payload)}
+
+
+def _join_plain(video: bytes, parts: Parts, sections: Mapping[str, bytes]) -> bytes:
+    header = parts.get(TABLE, parts[JSON])
+    if TABLE not in parts:
+        lengths = {name: len(data) for name, data in sections.items()}
+        with contextlib.suppress(ValueError, TypeError, RecursionError):  # the header may be what was changed
+            header = json.dumps({**json.loads(header), "sections": lengths}).encode()
+    deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
+    block = pack_block(deflater.compress(header) + deflater.flush())
+    track = CHECKSUM.pack(_video_checksum(video)) + parts[PLAIN]
+    payload = b"".join([bytes([PLAIN_VERSION]), block, *sections.values(), track])
+    return payload + CHECKSUM.pack(zlib.crc32(payload))
+
+
+def _boxed(payload: bytes) -> bytes:
+    return struct.pack(">I", 24 + len(payload)) + b"uuid" + BOX_UUID.bytes + payload
 
 
 def video_targets(seeds: tuple[Seed, ...]) -> list[Target]:
@@ -164,6 +203,11 @@ def _mutate_sections(beginnings: tuple[str, ...], parts: Parts, rng: np.random.G
 
 def _mutate_table(parts: Parts, rng: np.random.Generator, seeds: tuple[Seed, ...]) -> Parts:
     """Change the table of sections, whose own checksum holds."""
+    if PLAIN in parts:
+        table = parts[JSON]
+        for _ in range(_changes(rng)):
+            table = mutate_json(table, rng)
+        return {**parts, TABLE: table}
     data = join_video(parts)[FILE]
     payload = data[data.rindex(BOX_UUID.bytes) + 16 :]
     names = [HEADER, *(name for name in parts if name not in (VIDEO, JSON))]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gvpipe.asset_coding.reader import AssetReader
 from gvpipe.coding.registry import open_reader
-from gvpipe.container.bitstream import CHECKSUM, ENTRY, MAGIC, PREFIX, VERSION, Bitstream
+from gvpipe.container.bitstream import CHECKSUM, ENTRY, MAGIC, PREFIX, VERSION, Bitstream, pack_header
 from gvpipe.foundation.budget import Budget
 
 ODD = (
@@ -70,9 +70,17 @@ def _paths(values: Any) -> Iterator[tuple[Any, ...]]:
             yield (key, *rest)
 
 
-def payload_of(header: str, sections: dict[str, bytes]) -> bytes:
-    """A payload with whatever header."""
-    parts = {"header": zlib.compress(header.encode()), **sections}
+def payload_of(header: str, sections: Mapping[str, bytes]) -> bytes:
+    """A payload of container version 1 with whatever header."""
+    return _payload({"header": zlib.compress(header.encode()), **sections})
+
+
+def first_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
+    """The payload of container version 1, as files had it; ``extra`` is the container's own part of the header."""
+    return _payload({"header": pack_header(bitstream, extra), **bitstream.sections})
+
+
+def _payload(parts: Mapping[str, bytes]) -> bytes:
     head = MAGIC + PREFIX.pack(VERSION, len(parts))
     head += b"".join(bytes([len(k.encode())]) + k.encode() + ENTRY.pack(len(v), zlib.crc32(v)) for k, v in parts.items())
     return head + CHECKSUM.pack(zlib.crc32(head)) + b"".join(parts.values())

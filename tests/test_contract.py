@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import struct
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -16,8 +15,7 @@ import pytest
 import gvpipe
 from gvpipe.coding.codec import Codec
 from gvpipe.coding.registry import codec_class, codec_ids, open_reader
-from gvpipe.container import bitstream as payloads
-from gvpipe.container import mp4
+from gvpipe.container import mp4, plain
 from gvpipe.foundation.errors import (
     CorruptFile,
     NewerVersion,
@@ -147,8 +145,8 @@ def test_one_flipped_byte_in_each_section_is_refused(path: Path, tmp_path: Path)
     data = path.read_bytes()
     bitstream = mp4.read_file(path)
     targets = {name: data.index(section) for name, section in bitstream.sections.items() if section}
-    targets["table"] = payload_start(data) + 24 + len(payloads.MAGIC) + 3
-    targets["magic"] = payload_start(data) + 24
+    targets["length of the header"] = payload_start(data) + 25
+    targets["version"] = payload_start(data) + 24
     targets["header"] = data.index(next(s for s in bitstream.sections.values() if s)) - 5
     targets["video"] = data.index(b"mdat") + 40
     for name, at in targets.items():
@@ -164,9 +162,8 @@ def test_one_flipped_byte_in_each_section_is_refused(path: Path, tmp_path: Path)
 def test_wrong_files_each_have_their_error(path: Path, tmp_path: Path) -> None:
     data = path.read_bytes()
     start = payload_start(data)
-    version = start + 24 + len(payloads.MAGIC)
     newer = bytearray(data)
-    newer[version : version + 2] = struct.pack("<H", payloads.VERSION + 1)
+    newer[start + 24] = plain.VERSION + 1
     wrong = {
         CorruptFile: [data + b"\0", data[: start + 24] + b"GVPIPE\r\n" + data[start + 32 :]],
         StrippedFile: [data[:start]],

@@ -38,9 +38,10 @@ from gvpipe.model.sequence import MeshSequence
 
 ASSET = GOLDEN / "pdct-1-asset.mp4"
 STILL = GOLDEN / "mcgv-1-still.mp4"
+PLAIN = GOLDEN / "layouts" / "plain-mcgv.mp4"  # of container version 2
 
 
-@pytest.mark.parametrize("path", [ASSET, STILL], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [ASSET, STILL, PLAIN], ids=lambda path: path.stem)
 def test_a_video_put_together_is_the_same(path: Path, tmp_path: Path) -> None:
     parts = split_video(path.read_bytes())
     again = write_files(join_video(parts), tmp_path / "case")

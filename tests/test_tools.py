@@ -57,3 +57,13 @@ def test_sizes_of_the_last_release_are_figures() -> None:
     assert rows and all(set(row) == {"sequence", "codec", "bytes", "bpvf", "kg", "seconds"} for row in rows)
     assert {row["codec"] for row in rows} <= set(tool["CODECS"])
     assert tool["find_grown"](rows, rows) == []
+
+
+def test_curves_that_are_measured_again() -> None:
+    """Those that a file lacks; and, with a commit, those of another."""
+    tool = runpy.run_path(str(ROOT / "tools" / "measure_curves.py"))
+    known = {"curves": [{"codec": "pca", "commit": "a"}, {"codec": "famc", "commit": "b"}], "refused": {"gv": "no surface"}}
+    codecs = ("pca", "famc", "gv", "mcgv")
+    assert [codec for codec in codecs if tool["is_wanted"](known, codec, None)] == ["mcgv"]
+    assert [codec for codec in codecs if tool["is_wanted"](known, codec, "a")] == ["famc", "gv", "mcgv"]
+    assert tool["is_own"]("pca:predictor=rbf")

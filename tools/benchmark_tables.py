@@ -109,7 +109,22 @@ def curves() -> dict[str, dict[str, Points]]:
 
 def curve_reports() -> list[BenchReport]:
     """What ``tools/measure_curves.py`` wrote."""
-    return [BenchReport.read(path) for path in sorted((DOCS / "benchmarks" / "curves").glob("*.json"))]
+    return [BenchReport.read(path) for path in curve_files()]
+
+
+def curve_files() -> list[Path]:
+    """The results that ``tools/measure_curves.py`` wrote."""
+    return sorted((DOCS / "benchmarks" / "curves").glob("*.json"))
+
+
+def curves_plot() -> list[str]:
+    """The element that ``docs/curves.js`` fills, with the addresses of its results on the site."""
+    files = [path.relative_to(DOCS).as_posix() for path in curve_files()]
+    text = "The plot is on the site of this documentation. Elsewhere the pictures below have the curves."
+    return [
+        f'<div id="curves" data-files="{" ".join(files)}">{text}</div>',
+        '<script type="module" src="../curves.js"></script>',
+    ]
 
 
 def rates_at_bound() -> list[str]:
@@ -243,6 +258,7 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "default-against-published": default_against_published,
     "errors-at-quality-75": errors_at_quality,
     "rates-at-bound": rates_at_bound,
+    "curves-plot": curves_plot,
     "curves-leaders": lambda: leaders(curves(), ANCHOR, MEASURED),
     "curves-rates-kg-1": lambda: rates(curves(), ANCHOR, "kg", 1.0),
     "curves-rates-kg-0.1": lambda: rates(curves(), ANCHOR, "kg", 0.1),
@@ -254,6 +270,7 @@ TABLES: dict[str, Callable[[], list[str]]] = {
     "reproduction-pca": lambda: reproduced("pca"),
     "reproduction-laplacian": lambda: reproduced("laplacian"),
     "reproduction-pdct": lambda: reproduced("pdct"),
+    "reproduction-baselines": lambda: reproduced("baselines"),
     "reproduction-systems": baselines,
     "scale-growth": growth,
     "scale-memory": memory,

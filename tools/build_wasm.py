@@ -47,7 +47,7 @@ RESIDUALS = ("gvpipe.trajectory.contexts.Residuals", [NUMBERS, NUMBERS, LONGS])
 INPUTS = ("gvpipe.trajectory.contexts.ContextInputs", [INTS] * 5 + [LONGS] * 3)
 STREAM = ("gvpipe.entropy.block_kernels.BlockStream", ["uint64[1]", "uint32[1]", "uint64[2]", LONGS])
 TRELLIS = ("gvpipe.entropy.learning_kernels.LearningStream", ["uint64[1]", "uint32[1]", NUMBERS])
-VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS])
+VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS, FLOATS])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
     [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
@@ -90,6 +90,17 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
     "gvpipe.connectivity.visit_kernels.sort_neighbours": [NUMBERS, NUMBERS, NUMBERS],
     "gvpipe.connectivity.visit_kernels.traverse_visits": [LISTS, SCALAR, VISITS, "bool"],
     "gvpipe.connectivity.order_kernels.code_visits": [LISTS, LONGS, SCALAR, MIXING, LONGS, BYTES, "bool", LONGS],
+    "gvpipe.connectivity.candidate_kernels.code_by_candidates": [
+        LISTS,
+        LONGS,
+        SCALAR,
+        MIXING,
+        MIXING,
+        LONGS,
+        BYTES,
+        "bool",
+        LONGS,
+    ],
     "gvpipe.connectivity.fitted_kernels.code_fitted": [ENTRIES, TRIANGLES, LONGS, MIXING, LONGS, BYTES, "bool", NUMBERS],
     "gvpipe.connectivity.position_kernels.code_positions": [ENTRIES, MIXING, LONGS, BYTES, "bool", NUMBERS],
     "gvpipe.connectivity.cell_kernels.code_cells": [

@@ -3,26 +3,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from gvbaselines.square_map import SquareMap
-from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.arrays import Float64, Int64
 
 
-def sample_matrix(found: SquareMap, size: int, n_points: int) -> sparse.csr_array:
-    """The matrix ``(n^2, P)`` from values of points to an image of n x n pixels: barycentric in the triangle at each pixel."""
-    from gvbaselines.sampling_kernels import locate
+def fit_images(read: sparse.csr_array, size: int, smoothness: float) -> Callable[[Float64], Float64]:
+    """What makes images of points ``(P, c)``: of n x n pixels, as ``(n^2, c)``, from which ``read`` gives the points back.
 
-    triangles, shares = locate(found.disk.triangles, found.places * (size - 1), size)
-    known = np.flatnonzero(triangles >= 0)
-    columns = found.disk.points[found.disk.triangles[triangles[known]]]
-    pixels = np.repeat(known, 3)
-    matrix = sparse.coo_array((shares[known].ravel(), (pixels, columns.ravel())), shape=(size * size, n_points)).tocsr()
-    if len(known) == size * size:
-        return matrix
-    nearest = _nearest_known(known, size)  # pixels that rounding leaves between triangles
-    return matrix[nearest]
+    The image minimises the squared error of the points, plus ``smoothness`` times its squared second differences.
+    """
+    beside = sparse.diags_array([-np.ones(size - 1), np.r_[1, np.full(size - 2, 2), 1], -np.ones(size - 1)], offsets=[-1, 0, 1])
+    alone = sparse.eye_array(size)
+    curvature = sparse.kron(alone, beside) + sparse.kron(beside, alone)
+    system = splu(sparse.csc_array(read.T @ read + smoothness * (curvature.T @ curvature)))
+    return lambda points: np.asarray(system.solve(read.T @ points))
 
 
 def read_matrix(places: Int64, one: int, size: int) -> sparse.csr_array:
@@ -47,13 +47,3 @@ def round_places(found: SquareMap, n_points: int, one: int) -> Int64:
     result = np.zeros((n_points, 2), np.int64)
     result[found.disk.points[first]] = np.clip(np.rint(found.places[first] * one), 0, one).astype(np.int64)
     return result
-
-
-def _nearest_known(known: Int64, size: int) -> Int64:
-    """For each pixel the nearest that lies in a triangle: ``(n^2,)``."""
-    from scipy.ndimage import distance_transform_edt
-
-    missing = np.ones(size * size, bool)
-    missing[known] = False
-    rows, columns = distance_transform_edt(missing.reshape(size, size), return_distances=False, return_indices=True)
-    return np.asarray((rows * size + columns).ravel(), np.int64)

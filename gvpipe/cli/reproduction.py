@@ -12,20 +12,24 @@ from gvpipe.cli.console import Output, output_options
 @click.option("--data", default="data", show_default=True, metavar="DIR", help="Folder with the sequences, NAME.npz.")
 @click.option("--quick", is_flag=True, help="Three qualities in place of six, without the largest sequence.")
 @click.option("--out", "folder", metavar="DIR", help="Write reproduction.json, reproduction.md and curves.json there.")
+@click.option("--again", metavar="ID,ID...", help="Measure these codecs anew, though --out has their curves; all: every codec.")
 @output_options
-def reproduce(papers: tuple[str, ...], data: str, quick: bool, folder: str | None, out: Output) -> None:
-    """Measure what the papers of mcgv, pca, laplacian and pdct claim, and say which numbers hold.
+def reproduce(papers: tuple[str, ...], data: str, quick: bool, folder: str | None, again: str | None, out: Output) -> None:
+    """Measure what the papers of mcgv, pca, laplacian and pdct claim, and say which numbers hold; baselines: theirs.
 
-    Curves that an earlier run left in --out are not measured again. Baselines come from `pip install ./baselines`.
+    Without PAPERS: all. Curves and claims are kept in --out as they are found, and a later run goes on there. It measures
+    no curve twice, except with --again. Baselines come from `pip install ./baselines`.
 
     \b
-    gvpipe reproduce laplacian --data sequences --out results
+    gvpipe reproduce --data sequences --out results
+    gvpipe reproduce laplacian --data sequences --out results --again laplacian,coddyac
     gvpipe reproduce mcgv pca laplacian pdct --data sequences --quick
     """
     from gvpipe.benchmark.reproduction import reproduce as reproducing
 
     with out.progress() as progress:
-        made = reproducing.reproduce(papers or tuple(reproducing.PAPERS), data, quick, folder, progress)
+        wanted = papers or tuple(reproducing.PAPERS)
+        made = reproducing.reproduce(wanted, data, quick, folder, progress, again.split(",") if again else ())
     out.json(made.to_json())
     out.text(made.markdown().rstrip("\n"))
 

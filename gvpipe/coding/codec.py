@@ -172,6 +172,11 @@ class Codec(Protocol):
         """0..100: names the target error (`gvpipe.coding.quality_scale`); bytes rise with it, the error falls."""
         ...
 
+    @property
+    def is_cheap_again(self) -> bool:
+        """Whether an encode at another quality, with the memo of the first, takes a tenth of its time or so."""
+        ...
+
     def encode(self, sequence: MeshSequence, progress: Progress | None = None, memo: Memo | None = None) -> Encoded:
         """Code a sequence.
 
@@ -267,6 +272,11 @@ class BaseCodec:
     codes_live: ClassVar[bool] = False
     competes: ClassVar[bool] = True
     effort: ClassVar[float] = 1.0
+
+    @property
+    def is_cheap_again(self) -> bool:
+        """Whether another encode takes little; see `Codec.is_cheap_again`. Here: no."""
+        return False
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

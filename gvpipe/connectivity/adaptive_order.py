@@ -1,7 +1,7 @@
-"""The vertex order of a mesh <-> bytes, as in `vertex_order`, with ranks that adapt.
+"""Bytes -> the vertex order of a mesh, as in `vertex_order`, with ranks that adapt. Older files have it.
 
-Why: objects recur (wheels, studs, links of a chain), each numbered like the one before. A fixed table of ranks cannot
-see it; contexts of earlier ranks, mixed decision by decision, take a quarter of the bytes there.
+Objects recur (wheels, studs, links of a chain), each numbered like the one before. A fixed table of ranks cannot see it;
+contexts of earlier ranks can, mixed decision by decision. Encoders now write `candidate_order`, which is smaller.
 
 Stream: decisions (`gvpipe.entropy.decision_kernels`), as `order_kernels` asks for them.
 """
@@ -21,24 +21,13 @@ if TYPE_CHECKING:
     from gvpipe.entropy.decision_kernels import Mixing
 
 MAX_VERTICES = 1 << 16  # larger meshes take too long
-MAX_BYTES = 16  # per vertex, of a stream
-
-
-def encode_adaptive_order(visits: Array, points: Array, faces: Array) -> bytes:
-    """Code ``visits (V,)``, where visits[v] is the codec's vertex of the user's vertex v.
-
-    ``points (V,)`` are the vertices' points and ``faces (T, 3)`` the triangles, in the codec's order.
-    """
-    from gvpipe.connectivity.order_kernels import code_visits
-    from gvpipe.entropy.decision_kernels import finish, start_encoder
-
-    state, data = start_encoder(), np.zeros(MAX_BYTES * len(visits) + 64, np.uint8)
-    code_visits(*_known(points, faces), state, data, False, visits.astype(np.int64))
-    return data[: finish(state, data)].tobytes()
 
 
 def decode_adaptive_order(data: bytes, points: Array, faces: Array) -> Int64:
-    """Mirror of `encode_adaptive_order`: ``(V,)``, always a permutation; raises `CorruptFile`."""
+    """Decode ``visits (V,)``, where visits[v] is the codec's vertex of the user's vertex v, always a permutation.
+
+    ``points (V,)`` are the vertices' points and ``faces (T, 3)`` the triangles, in the codec's order. Raises `CorruptFile`.
+    """
     from gvpipe.connectivity.order_kernels import code_visits
     from gvpipe.entropy.decision_kernels import AHEAD, PLACE, start_decoder
 
@@ -53,7 +42,7 @@ def decode_adaptive_order(data: bytes, points: Array, faces: Array) -> Int64:
 
 
 def _known(points: Array, faces: Array) -> tuple[NeighbourLists, Int64, int, Mixing]:
-    """What both directions know: neighbours, points, the reach of a search, and what was learnt: nothing."""
+    """What a decoder knows: neighbours, points, the reach of a search, and what was learnt: nothing."""
     from gvpipe.connectivity.order_kernels import N_CONTEXTS, N_GROUPS
     from gvpipe.entropy.number_kernels import new_number_mixing
 

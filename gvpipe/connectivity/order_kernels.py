@@ -109,7 +109,7 @@ def _code(
         number = code_number(mixing, contexts, group, state, data, decoding, False, number)
         target = visits[v]
         if number == 0:
-            place = _code_index(state, data, decoding, position[target] if not decoding else 0, n_vertices - v)
+            place = code_index(state, data, decoding, position[target] if not decoding else 0, n_vertices - v)
             target = left[place]
         elif decoding:
             if number > reach:
@@ -186,7 +186,7 @@ def _add_history(numbers: Int64, row: int, contexts: Int64) -> None:
 
 
 @compiled
-def _code_index(state: Int64, data: UInt8, decoding: bool, index: int, n: int) -> int:
+def code_index(state: Int64, data: UInt8, decoding: bool, index: int, n: int) -> int:
     """Code an index, 0..n-1, all alike: halves of what is left."""
     low, high = 0, n
     while high - low > 1:

@@ -6,7 +6,7 @@ the user's order of vertices follows.
 
 Streams: vertices of each point less one [integers]; the corners on seams, across edges (`edge_seams`).
 
-Order stream: `vertex_order`, points in place of positions, or `adaptive_order`.
+Order stream: `vertex_order`, points in place of positions, or `candidate_order`; in older files also `adaptive_order`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.connectivity import adaptive_order
+from gvpipe.connectivity import adaptive_order, candidate_order
 from gvpipe.connectivity.edge_seams import decode_across_edges, encode_across_edges
 from gvpipe.connectivity.vertex_order import (
     MAX_VERTICES,
@@ -47,7 +47,7 @@ class CodedSeams:
         permutation: ``(V,)`` the given vertex of each decoded one.
         faces: ``(T, 3)`` decoded triangles.
         points: ``(V,)`` the point of each decoded vertex.
-        is_adaptive: whether ``order`` is of `adaptive_order`.
+        is_adaptive: whether ``order`` is of `candidate_order`.
     """
 
     counts: bytes
@@ -70,7 +70,7 @@ def encode_seams(
         point_faces: ``(T, 3)`` the same triangles over points, smallest point first, as the decoder will have them.
         n_points: P.
         reorder: let the decoder see the codec's vertex order.
-        adaptive: the order may be coded by `adaptive_order`, where that is much smaller.
+        adaptive: the order may be coded by `candidate_order`, where that is much smaller.
     """
     # triangles alike over points are matched in order of appearance: which is which does not matter
     corner_order = corners_from_smallest(points[faces])
@@ -88,10 +88,10 @@ def encode_seams(
 
 
 def _encode_order(visits: Array, points: Array, faces: Array, adaptive: bool) -> tuple[bytes, bool]:
-    """The stream of an order, and whether it is that of `adaptive_order`."""
+    """The stream of an order, and whether it is that of `candidate_order`."""
     order = encode_order(visits, _as_lattice(points), faces)
-    if adaptive and len(points) <= adaptive_order.MAX_VERTICES:
-        other = adaptive_order.encode_adaptive_order(visits, points, faces)
+    if adaptive and len(points) <= candidate_order.MAX_VERTICES:
+        other = candidate_order.encode_candidate_order(visits, points, faces)
         if len(other) < WORTHWHILE * len(order):
             return other, True
     return order, False
@@ -110,12 +110,14 @@ def decode_seams(
 ) -> tuple[Array, Array]:
     """Mirror of `encode_seams`: triangles ``(T, 3)`` over at most ``n_vertices``, and the point of each vertex ``(V,)``.
 
-    ``adaptive``: the order is of `adaptive_order`. ``graph``: of the points, where there is one: it saves time.
+    ``adaptive``: the order is of `adaptive_order`, as in older files. ``graph``: of the points, if there is one; saves time.
     """
     faces, points = _decode_corners(_decode_counts(counts, n_points, n_vertices), corners, point_faces)
     if order:
         if adaptive:
             visits = adaptive_order.decode_adaptive_order(order, points, faces)
+        elif order[0] == candidate_order.MARK:
+            visits = candidate_order.decode_candidate_order(order, points, faces)
         elif graph is not None and len(points) == n_points:  # no seams
             visits = decode_order(order, nearest_numbers(graph))
         else:

@@ -81,7 +81,7 @@ def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh
     faces, points = faces.astype(np.int64), points.astype(np.int64)
     n_points = int(points.max()) + 1
     parts, permutation, coded_faces = encode_triangles(points[faces], n_points)
-    coded = encode_seams(faces, np.argsort(permutation)[points], coded_faces, n_points, reorder)
+    coded = encode_seams(faces, np.argsort(permutation)[points], coded_faces, n_points, reorder, adaptive=True)
     head = HEADER.pack(*(len(part) for part in parts[:2]), len(parts[2]), len(coded.counts), parts[3], n_points)
     streams = head + b"".join([*parts[:3], coded.counts, coded.corners])
     decoded = Topology(coded.faces.astype(np.int32), coded.points, coded_faces.astype(np.int32), n_points)

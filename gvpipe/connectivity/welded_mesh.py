@@ -6,8 +6,8 @@ are coded once. The mesh over points, with positions, is that of `base_mesh`; `s
 Mesh stream: [8 bits] flags; [varint] length, mesh of points (codec order); [varint] length, counts; corners (`seams`).
 Order stream: `seams`.
 
-Flag 4: the mesh of points is of `adaptive_mesh`; 1: an older one of that; neither: of `base_mesh`. Flag 2: the order is of
-`adaptive_order`. An encoder takes 4 and 2 where they are smaller.
+Flag 4: the mesh of points is of `adaptive_mesh`; 1: an older one of that; neither: of `base_mesh`. An encoder takes 4 where it
+is smaller. Flag 2: the order is of `adaptive_order`, as older encoders wrote it.
 """
 
 from __future__ import annotations
@@ -89,10 +89,9 @@ def encode_points(
     place = np.argsort(permutation)
     point_faces = smallest_first(base.faces.astype(np.int64))
     coded = encode_seams(faces, place[points], point_faces, len(lattice), reorder, adaptive)
-    flags |= ADAPTIVE_ORDER if coded.is_adaptive else 0
     mesh = bytes([flags]) + pack_block(mesh) + pack_block(coded.counts) + coded.corners
     decoded = WeldedMesh(base.points, point_faces.astype(np.int32), coded.faces.astype(np.int32), coded.points)
-    return EncodedMesh(mesh, coded.order, coded.permutation, is_adaptive=flags > 0), decoded
+    return EncodedMesh(mesh, coded.order, coded.permutation, is_adaptive=flags > 0 or coded.is_adaptive), decoded
 
 
 def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, int, Array, BaseMesh]:

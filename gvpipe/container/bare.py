@@ -4,11 +4,10 @@ It has no poster, no tag, no table of sections and one checksum. Programs that k
 the codec's pictures::
 
     file    = ftyp, moov, mdat, "uuid" box with the payload
-    payload = magic, [u16] version, [varint] length of the header, header, sections one after the other, [u32] CRC-32 of these
-    header  = a JSON object in UTF-8, deflated without head and checksum, with `DICTIONARY`
+    payload = magic, [u16] version, header, sections one after the other, [u32] CRC-32 of these
 
-The header is that of the plain layout, and ``sections`` has the length of each section by name, in order. A file of
-10 kB in the plain layout gives a tenth of its bytes to what is missing here.
+The header is that of `gvpipe.container.compact_header`. A file of 10 kB in the plain layout gives a twelfth of its bytes to
+what is missing here.
 
 Version 2 is that of files in a shard: ``shared`` has the hash of each section that the shard holds in place of the file
 (`gvpipe.container.shared_sections`).
@@ -16,28 +15,17 @@ Version 2 is that of files in a shard: ``shared`` has the hash of each section t
 
 from __future__ import annotations
 
-import json
 import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gvpipe.container.bitstream import (
-    CHECKSUM,
-    HEADER,
-    MAX_HEADER,
-    MAX_SECTIONS,
-    NAME,
-    VERSION,
-    Bitstream,
-    check_version,
-    header_values,
-    parse_header,
-)
+from gvpipe.container.bitstream import CHECKSUM, HEADER, VERSION, Bitstream, check_version, parse_header
 from gvpipe.container.boxes import BOX
-from gvpipe.container.cursor import Cursor, pack_block
-from gvpipe.container.json_object import JsonObject, unpack_json
+from gvpipe.container.compact_header import compact_values, pack_compact, section_lengths, unpack_compact
+from gvpipe.container.cursor import Cursor
+from gvpipe.container.json_object import JsonObject
 from gvpipe.container.shared_sections import FindSection, find_shared
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import TruncatedFile, corrupt
@@ -45,10 +33,7 @@ from gvpipe.foundation.errors import TruncatedFile, corrupt
 MAGIC = b"gvbare\r\n"
 PREFIX = struct.Struct("<H")
 NO_TRACKS = BOX.pack(16, b"ftyp") + b"isom" + bytes(4) + BOX.pack(8, b"moov") + BOX.pack(8, b"mdat")
-MAX_LENGTH = 1 << 40  # of a section, bytes
-SECTIONS = "sections"
 SHARED, WITH_SHARED = "shared", 2  # key of the header, and the version of payloads that have it
-RAW = -15  # deflate without head and checksum, window of 32 KiB
 
 # What headers have in common, the most frequent last. Files depend on it: it never changes within a version.
 DICTIONARY = (
@@ -72,15 +57,10 @@ def pack_bare(bitstream: Bitstream, extra: Mapping[str, Any], shared: Mapping[st
         shared: hashes of sections that are left out, by name.
     """
     shared = shared or {}
-    values = header_values(bitstream, extra)
-    if not extra:
-        del values["container"]
-    values[SECTIONS] = {name: len(data) for name, data in bitstream.sections.items()}
+    values = compact_values(bitstream, extra)
     if shared:
         values[SHARED] = dict(shared)
-    deflater = zlib.compressobj(9, zlib.DEFLATED, RAW, zdict=DICTIONARY)
-    text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
-    header = pack_block(deflater.compress(text) + deflater.flush())
+    header = pack_compact(values, DICTIONARY)
     own = [data for name, data in bitstream.sections.items() if name not in shared]
     payload = b"".join([MAGIC, PREFIX.pack(WITH_SHARED if shared else VERSION), header, *own])
     return payload + CHECKSUM.pack(zlib.crc32(payload))
@@ -113,22 +93,13 @@ def unpack_bare(payload: bytes, budget: Budget = UNLIMITED, find: FindSection | 
     cursor.take(start)
     if version < 1:
         raise cursor.corrupt(f"version {version}")
-    inflater = zlib.decompressobj(RAW, zdict=DICTIONARY)
-    header = unpack_json(cursor.block(), HEADER, MAX_HEADER, budget, inflater)
+    header = unpack_compact(cursor, DICTIONARY, budget)
     bitstream = parse_header(header, budget)
-    lengths = _lengths(header.object(SECTIONS))
+    lengths = section_lengths(header)
     shared = _find_shared(header, lengths, budget, find) if version == WITH_SHARED else {}
     sections = {name: shared[name] if name in shared else cursor.take(length) for name, length in lengths.items()}
     cursor.end()
     return replace(bitstream, sections=sections, is_bare=True, n_bytes=sum(map(len, shared.values()))), header
-
-
-def _lengths(found: JsonObject) -> dict[str, int]:
-    """Bytes of each section, in order."""
-    names = list(found.plain)
-    if len(names) > MAX_SECTIONS or not all(name.isascii() and NAME.fullmatch(name.encode()) for name in names):
-        raise found.corrupt("the names of its sections are not of a to z, 0 to 9 and dots")
-    return {name: found.integer(name, 0, MAX_LENGTH) for name in names}
 
 
 def _find_shared(header: JsonObject, lengths: dict[str, int], budget: Budget, find: FindSection | None) -> dict[str, bytes]:

@@ -1,6 +1,7 @@
 """What a codec makes of a sequence, and the bytes that keep it: a header, named sections and, for image codecs, a video.
 
-All fields are little-endian; varints are those of `gvpipe.container.cursor`::
+All fields are little-endian; varints are those of `gvpipe.container.cursor`. This is the payload of version 1 of the plain
+layout, which is read alone; version 2 is `gvpipe.container.plain`::
 
     payload = magic, [u16] version, [u16] section count,
               sections x ([u8] name length, name, [u64] length, [u32] CRC-32), [u32] CRC-32 of all before, section data
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from gvpipe.media.video import Fragments
 
 MAGIC = b"gvpipe\r\n"
-VERSION = 1  # of all layouts
+VERSION = 1  # of all layouts; the plain one has a later one (`gvpipe.container.plain`)
 MAX_SECTIONS = 4096
 MAX_NAME = 64
 MAX_HEADER = 1 << 20  # bytes, inflated
@@ -163,19 +164,8 @@ def pack_header(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
     return zlib.compress(json.dumps(header_values(bitstream, extra), separators=(",", ":"), allow_nan=False).encode(), 9)
 
 
-def pack_payload(bitstream: Bitstream, extra: Mapping[str, Any]) -> bytes:
-    """Return the payload of everything but the video; ``extra`` is the container's own part of the header."""
-    sections = {HEADER: pack_header(bitstream, extra), **bitstream.sections}
-    head = [MAGIC, PREFIX.pack(VERSION, len(sections))]
-    for name, data in sections.items():
-        encoded = name.encode()
-        head.append(bytes([len(encoded)]) + encoded + ENTRY.pack(len(data), zlib.crc32(data)))
-    table = b"".join(head)
-    return b"".join([table, CHECKSUM.pack(zlib.crc32(table)), *sections.values()])
-
-
 def unpack_payload(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream, JsonObject]:
-    """Mirror of `pack_payload`: the bitstream without its video, and the container's part of the header.
+    """Read a payload of version 1: the bitstream without its video, and the container's part of the header.
 
     Args:
         payload: the bytes.
@@ -224,9 +214,9 @@ def check_version(version: int, latest: int = VERSION) -> None:
 
 
 def check_payload_version(payload: bytes) -> None:
-    """Raise `NewerVersion` for a payload of a container version above `VERSION`, whatever else it is."""
+    """Raise `NewerVersion` for a payload with `MAGIC` of a container version above `VERSION`, whatever else it is."""
     head = payload[: len(MAGIC) + PREFIX.size]
-    if len(head) == len(MAGIC) + PREFIX.size and head.startswith(MAGIC):
+    if len(head) == len(MAGIC) + PREFIX.size:
         check_version(PREFIX.unpack(head[len(MAGIC) :])[0])
 
 

@@ -3,8 +3,8 @@
 The file is the video as any player opens it, plus one ``uuid`` box with the payload after everything else, where
 players skip it and no sample offset moves, plus one short metadata tag. The tag survives remuxing and the box does not: so
 a file that lost its box says so. The tag is a comment, because FFmpeg drops names that it does not know unless an option
-keeps them. The payload repeats the tag's content id and holds a checksum of the video's samples, so that a box or a video
-from another file is noticed::
+keeps them. The payload's sections have the tag's content id, and it holds a checksum of the video's samples. So a box or a
+video from another file is noticed::
 
     tag     = "comment" -> "gvpipe <container version> <content id>"
     box     = [u32 big-endian] size, "uuid", [16 bytes] UUID, payload     (64-bit size form above 4 GiB)
@@ -25,14 +25,14 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 from uuid import UUID
 
-from gvpipe.container import bare
+from gvpipe.container import bare, plain
 from gvpipe.container.bitstream import (
+    MAGIC,
     VERSION,
     Bitstream,
     check_payload_version,
     check_version,
     pack_header,
-    pack_payload,
     unpack_payload,
 )
 from gvpipe.container.boxes import BOX, LARGE, Box, uuid_head
@@ -234,12 +234,12 @@ def _pack(bitstream: Bitstream, parts: SegmentParts | None, shared: Mapping[str,
     identity = _content_id(bitstream)
     track = inspect(bitstream.video)
     companions = bitstream.companions
-    extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration, **describe(companions)}
     if parts is not None:
+        extra = {"id": identity, "video_crc32": track.checksum, "track_crc32": track.configuration, **describe(companions)}
         fragmented = remux_fragments(bitstream.video, f"{VERSION} {identity}")
         return pack_stream(fragmented, pack_header(bitstream, extra), bitstream.sections, parts, companions)
-    payload = pack_payload(bitstream, extra)
-    video = attach(remux(bitstream.video, f"{VERSION} {identity}"), companions)
+    payload = plain.pack_plain(bitstream, describe(companions), (track.checksum, track.configuration))
+    video = attach(remux(bitstream.video, f"{plain.VERSION} {identity}"), companions)
     return chain(video, [uuid_head(BOX_UUID, len(payload)), payload])
 
 
@@ -307,17 +307,18 @@ def _read(file: IO[bytes], size: int, budget: Budget, find: FindSection | None) 
     if payload.startswith(bare.MAGIC):
         bitstream, header = bare.unpack_bare(payload, budget, find)
         return _with_pictures(replace(bitstream, n_bytes=size + bitstream.n_bytes), header, video, layout)
-    check_payload_version(payload)
+    is_first = payload.startswith(MAGIC)
+    (check_payload_version if is_first else plain.check_plain_version)(payload)
     own = geometry_of(video)
     check_tables(own[slice(*layout.moov)], layout.video_end)
     track = inspect(own, budget)
     tag = track.tag
     version = tag.partition(" ")[0]
     if version.isascii() and version.isdecimal() and len(version) < 10:
-        check_version(int(version))
-    bitstream, container = unpack_payload(payload, budget)
+        check_version(int(version), plain.VERSION)
+    bitstream, container = (unpack_payload if is_first else plain.unpack_plain)(payload, budget)
     identity = _content_id(bitstream)
-    if container.text("id") != identity or (tag and tag.split()[-1] != identity):
+    if (is_first and container.text("id") != identity) or (tag and tag.split()[-1] != identity):
         raise corrupt("its geometry belongs to another file")
     _check_track(container, track)
     described = read_described(container)

@@ -10,6 +10,8 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import IO, Any
 
+from gvpipe.container.boxes import Box, read_box
+from gvpipe.container.track_boxes import shifted, tracks_of
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.errors import corrupt
 from gvpipe.foundation.picture_limits import IN_MEMORY, picture_limits
@@ -19,6 +21,7 @@ TAG_PREFIX = "gvpipe "
 PLAIN = {"fflags": "+bitexact", "write_btrt": "0", "empty_hdlr_name": "1"}  # what no player needs is left out
 FRAGMENTS = "+frag_keyframe+delay_moov+default_base_moof+skip_trailer"
 LONGEST_MICROSECONDS = (1 << 31) - 1  # of FFmpeg's options
+HEAD = (b"ftyp", b"moov", b"free")  # of a file that FFmpeg wrote
 BLOCK = 1 << 20  # bytes that are copied at a time
 LEAST_PICTURES = 16  # of a fragment, the last apart: each costs 100 bytes
 
@@ -70,9 +73,29 @@ def _copy(video: bytes, tag: str, options: dict[str, str], least: int = 0) -> It
             for packet in _packets(source):
                 packet.stream = copy
                 target.mux(packet)
-        result.seek(0)
+        yield _head_without_space(result)
         while block := result.read(BLOCK):
             yield block
+
+
+def _head_without_space(file: IO[bytes]) -> bytes:
+    """The boxes before the samples, without the empty one that FFmpeg leaves; the file then stands behind that."""
+    size = file.seek(0, io.SEEK_END)
+
+    def read(offset: int, length: int) -> bytes:
+        file.seek(offset)
+        return file.read(length)
+
+    boxes: list[Box] = []
+    while len(boxes) < len(HEAD) and (box := read_box(read, boxes[-1].stop if boxes else 0, size)):
+        boxes.append(box)
+    if tuple(box.kind for box in boxes) != HEAD:
+        file.seek(0)
+        return b""
+    ftyp, moov, space = (read(box.start, box.stop - box.start) for box in boxes)
+    for track in tracks_of(moov):
+        moov = moov[: track.start] + shifted(track.of(moov), -len(space)) + moov[track.stop :]
+    return ftyp + moov
 
 
 def _packets(container: Any) -> Iterator[Any]:

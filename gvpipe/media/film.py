@@ -13,6 +13,7 @@ import numpy as np
 from gvpipe.foundation.arrays import UInt8
 from gvpipe.media.video import PROFILES, PlainPackets, VideoWriter, check_x264, has_x264, without_avx512, x264_options
 
+SMOOTH = ":no-deblock=0:deblock=0,0"  # for x264's filter of blocks, which pictures of data do without
 FILM = {"preset": "medium", "crf": "20"}  # x264 codes for the eye
 JPEG_STEP = 16  # levels: 2 kB for a poster
 
@@ -58,7 +59,9 @@ def hold_picture(plane: UInt8, fps: float, n_frames: int, quality: int) -> bytes
     neutral = np.full((height // 2, width), profile.middle, np.uint8)
     file = io.BytesIO()
     with av.open(file, "w", format="mp4", options={"fflags": "+bitexact"}) as container:
-        stream = container.add_stream("libx264", rate, options=x264_options(quality, 1, "slow"))
+        options = x264_options(quality, 1, "slow")
+        options["x264-params"] += SMOOTH
+        stream = container.add_stream("libx264", rate, options=options)
         stream.width, stream.height, stream.pix_fmt = width, height, profile.pixel_format
         stream.codec_context.time_base = 1 / rate
         picture = av.VideoFrame.from_ndarray(np.concatenate([plane, neutral]), format=profile.pixel_format)

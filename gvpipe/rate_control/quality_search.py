@@ -30,6 +30,7 @@ from gvpipe.rate_control.targets import NAMES, Target
 from gvpipe.rate_control.trials import Trial
 
 TOLERANCE = 0.03  # how far on its allowed side of the target a result may lie
+CLOSE = 0.01  # the same where further encodes take little
 MOST_ENCODES = 8
 RATE_SLOPE = (
     0.025  # assumed change of the logarithm of the size per unit of quality; of the error: `gvpipe.coding.quality_scale`
@@ -44,12 +45,29 @@ MOST_SCATTERED = 12  # encodes where they do
 SPACING = 0.05  # of quality: between trials there, at least
 LEAST_ERROR = 1e-300  # instead of 0, which has no logarithm
 
+
+class Closeness(NamedTuple):
+    """What ends a search.
+
+    Args:
+        tolerance: how far on its allowed side of the target a result may lie.
+        encodes: after so many, `TOLERANCE` is close enough.
+    """
+
+    tolerance: float
+    encodes: int
+
+
+DEAR = Closeness(TOLERANCE, 1)
+SMALL = Closeness(CLOSE, 4)  # of small sequences
+CHEAP = Closeness(CLOSE, 5)  # where further encodes take a tenth of the first
+
 Attempt = Callable[[float], Trial]
 """Encodes at a quality, and measures."""
 
 
-def find_quality(attempt: Attempt, target: Target, start: float) -> tuple[Trial, list[Trial]]:
-    """Search the quality that meets the target within the tolerance, from ``start`` on; return it and all trials, in order.
+def find_quality(attempt: Attempt, target: Target, start: float, closeness: Closeness = DEAR) -> tuple[Trial, list[Trial]]:
+    """Search the quality that meets the target closely, from ``start`` on; return it and all trials, in order.
 
     Quality 0 may meet a target error, and quality 100 a size: then that is the result. If no quality within the encodes
     allowed comes close enough, the closest on the allowed side is.
@@ -57,11 +75,11 @@ def find_quality(attempt: Attempt, target: Target, start: float) -> tuple[Trial,
     Raises:
         InputError: no quality meets the target; the message names the best.
     """
-    goal = _Goal(target)
+    goal = _Goal(target, closeness)
     search = _Search(goal, start)
     tried: list[Trial] = []
     quality: float | None = start
-    while quality is not None and len(tried) < MOST_ENCODES:
+    while quality is not None and len(tried) < MOST_ENCODES and not goal.is_enough(tried):
         tried.append(attempt(quality))
         quality = search.next_quality(_Point(quality, goal.value(tried[-1])))
     if search.is_scattered:
@@ -93,6 +111,7 @@ class _Goal:
     """A target as the root of a rising function of quality."""
 
     target: Target
+    closeness: Closeness
 
     @property
     def is_rate(self) -> bool:
@@ -105,13 +124,20 @@ class _Goal:
 
     def value(self, trial: Trial) -> float:
         """Logarithm of the trial's measure over the middle of what is close enough; below 0 where quality is too low."""
-        middle = self.target.value * math.sqrt(1 - TOLERANCE)
+        middle = self.target.value * math.sqrt(1 - self.closeness.tolerance)
         value = log(max(self.target.of(trial), LEAST_ERROR) / middle)
         return value if self.is_rate else -value
 
     def is_close(self, value: float) -> bool:
         """Whether the trial lies within the tolerance."""
-        return abs(value) <= -log(1 - TOLERANCE) / 2
+        return abs(value) <= -log(1 - self.closeness.tolerance) / 2
+
+    def is_enough(self, tried: list[Trial]) -> bool:
+        """Whether so many encodes were made that one within `TOLERANCE` ends the search."""
+        least = (1 - TOLERANCE) * self.target.value
+        return len(tried) >= self.closeness.encodes and any(
+            self.target.is_met(trial) and self.target.of(trial) >= least for trial in tried
+        )
 
 
 class _Bracket:
@@ -210,7 +236,7 @@ def _search_around(attempt: Attempt, goal: _Goal, tried: list[Trial], n_apart: i
     slope = _slope(min(points), max(points), goal.slope(points[-1].quality))
     spacing = SPACING
     further: list[Trial] = []
-    while len(tried) + len(further) < MOST_SCATTERED:
+    while len(tried) + len(further) < MOST_SCATTERED and not goal.is_enough([*tried, *further]):
         quality = _untried_near(_mean_root(points, slope), points, spacing)
         if quality is None:
             break

@@ -11,7 +11,7 @@ from gvpipe.coding.quality_scale import quality_of
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_spread
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rate_control.quality_search import TOLERANCE, find_quality
+from gvpipe.rate_control.quality_search import CHEAP, DEAR, SMALL, TOLERANCE, find_quality
 from gvpipe.rate_control.size_estimates import at_error
 from gvpipe.rate_control.smallest_search import find_smallest
 from gvpipe.rate_control.targets import NAMES, Target
@@ -19,6 +19,8 @@ from gvpipe.rate_control.trials import Trial, Trials
 
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
+
+SMALL_SEQUENCE = 250_000  # positions: any encode takes little
 
 
 class TooLarge(Exception):
@@ -51,7 +53,7 @@ def meet(
     asset: AssetCoder | None = None,
     is_bare: bool = False,
 ) -> Choice:
-    """Encode at the quality that meets a target, within 3 %.
+    """Encode at the quality that meets a target: within 1 % where further encodes are cheap, else within 3 %.
 
     The search starts at the quality of that rmse or KG error, for other targets at the codec's own. What ``asset`` codes beside
     the positions counts as bytes of the file, and ``is_bare`` says whether that is of the bare layout.
@@ -69,7 +71,9 @@ def meet(
         return Choice(trial, trials, tried, reason)
     trials = Trials(codec, sequence, target.largest, progress, asset, is_bare)
     attempt = trials if target.measure == "bpvf" else _GivingUp(trials, target, most)
-    trial, tried = find_quality(attempt, target, _start(target, codec, sequence))
+    is_small = sequence.n_frames * sequence.n_vertices <= SMALL_SEQUENCE
+    closeness = CHEAP if codec.is_cheap_again else SMALL if is_small else DEAR
+    trial, tried = find_quality(attempt, target, _start(target, codec, sequence), closeness)
     found = target.of(trial)
     reason = f"quality {trial.codec.quality:.4g} gives {NAMES[target.measure]} {found:.4g} where {target.value:g} is allowed"
     if found < (1 - TOLERANCE) * target.value:
@@ -92,7 +96,7 @@ class _GivingUp:
 
 
 def _start(target: Target, codec: Codec, sequence: MeshSequence) -> float:
-    """The first quality to try: of the KG error in the middle of what is close enough, or the codec's own."""
+    """The first quality to try: of the KG error in the middle of `TOLERANCE`, or the codec's own."""
     if target.measure not in ("rmse", "kg"):
         return codec.quality
     error = target.value * math.sqrt(1 - TOLERANCE)

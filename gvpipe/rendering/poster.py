@@ -14,9 +14,9 @@ from gvpipe.model.sequence import MeshSequence
 from gvpipe.rasterizer.camera import framing
 from gvpipe.rasterizer.renderer import Renderer
 
-SIZE = 128  # pixels, of both sides
+SIZE = 96  # pixels, of both sides
 SAMPLES = 3  # per pixel and axis
-QP = 42  # 150-400 bytes: small files pay for it, too
+QP = 41  # 110-330 bytes: small files pay for it, too
 LUMA = np.array([0.2126, 0.7152, 0.0722])  # BT.709, of sRGB bytes
 
 

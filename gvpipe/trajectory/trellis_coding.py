@@ -52,6 +52,8 @@ class TrellisDecoder:
         """Decode residuals of blocks, those before ``first_block`` being done; raises `CorruptFile` if they do not decode."""
         from gvpipe.trajectory.trellis_kernels import code_residuals
 
+        if residuals.ranked.size and not len(self._stream.words):
+            raise self._cursor.corrupt("it has no words")
         check_status(self._cursor, code_residuals(residuals, inputs, self._stream, first_block, end_block, False))
 
     def end(self) -> None:

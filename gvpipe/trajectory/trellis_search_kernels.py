@@ -51,23 +51,26 @@ class Paths(NamedTuple):
 
 
 @compiled
-def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float) -> Int64:
-    """Fill ``coding.residuals (m, R)`` and ``coding.decoded``; return the integers k ``(m, R)``.
+def search_paths(
+    coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float, factor: Float64, begin: int, end: int, found: Int64
+) -> None:
+    """Fill ``coding.residuals (m, R)``, ``coding.decoded`` and ``found (m, R)``, the integers k, of ranks ``begin`` to ``end``.
 
     Args:
         coding: ``step`` is the fine one.
         contexts: ``(m, R)`` of the forecast.
         prices: ``(54, N_PRICED)`` bits.
         penalty: of a bit.
+        factor: ``(m, m)`` of `gvpipe.trajectory.trellis_search.search`, or ``(0, 0)``.
     """
-    n_ranks, n_components = coding.residuals.shape
-    paths, found = _empty_paths(n_components, most_neighbours(coding)), np.zeros((n_ranks, n_components), np.int64)
-    for rank in range(n_ranks):
+    n_components = coding.residuals.shape[1]
+    paths, aims = _empty_paths(n_components, most_neighbours(coding)), np.zeros(n_components)
+    for rank in range(begin, end):
+        weight = _aim(coding, rank, factor, aims)
         n = _begin(coding, rank, paths)
         for c in range(n_components):
             variance = _predict(coding, rank, c, n, paths)
-            target = coding.target[coding.causal.order[rank], c]
-            _extend(target, coding.step, prices[N_QUANTISERS * contexts[rank, c] :], penalty, c, paths)
+            _extend(aims[c], coding.step, prices[N_QUANTISERS * contexts[rank, c] :], penalty / weight, c, paths)
             _update(n, c, variance, coding.step, paths)
         state = 0
         for other in range(1, N_STATES):
@@ -78,7 +81,22 @@ def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty
             coding.decoded[coding.causal.order[rank], c] = paths.values[c, state]
             state = paths.before[c, state]
             coding.residuals[rank, c] = residual_of(number, state)
-    return found
+
+
+@compiled
+def _aim(coding: VectorCoding, rank: int, factor: Float64, aims: Float64) -> float:
+    """Fill ``aims (R,)``, components that suit the errors of the vectors before best; return the weight of squared errors."""
+    vector = coding.causal.order[rank]
+    for c in range(len(aims)):
+        aims[c] = coding.target[vector, c]
+    if not len(factor):
+        return 1.0
+    for other_rank in range(rank):
+        if factor[rank, other_rank] != 0.0:
+            part, other = factor[rank, other_rank] / factor[rank, rank], coding.causal.order[other_rank]
+            for c in range(len(aims)):
+                aims[c] -= part * (coding.decoded[other, c] - coding.target[other, c])
+    return float(factor[rank, rank] * factor[rank, rank])
 
 
 @compiled
@@ -126,7 +144,7 @@ def _predict(coding: VectorCoding, rank: int, c: int, n: int, paths: Paths) -> f
             store(own, k * width + at, column)
             store(following, at, load(following, at) + column * value)
     store(paths.guesses, 0, guesses)
-    variance = coding.step * coding.step
+    variance: float = coding.noises[c]
     for j in range(n):
         variance += (1 + DOUBT) * following[j] * near[j]
     inverse = same(1 / variance)

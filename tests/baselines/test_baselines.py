@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from odd_headers import first_payload
 from sequences import awkward, same_triangles, waving
 from shapes import ball
 
@@ -19,7 +20,7 @@ from gvbaselines.square_map import map_to_square
 from gvbaselines.wavelets import decode_levels, encode_levels, restore, transform
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
-from gvpipe.container.bitstream import pack_payload, unpack_payload
+from gvpipe.container.bitstream import unpack_payload
 from gvpipe.container.cursor import Cursor
 from gvpipe.foundation.errors import FormatError, InputError, SettingError
 from gvpipe.metrics.vertex_errors import measure_errors
@@ -62,7 +63,7 @@ def encoded(name: str) -> tuple[MeshSequence, Encoded]:
 
 def positions(codec: type[Baseline], made: Encoded) -> np.ndarray:
     """Decoded from bytes, ``(F, V, 3)``, in the order of the sequence's vertices."""
-    bitstream, _ = unpack_payload(pack_payload(made.bitstream, {}))
+    bitstream, _ = unpack_payload(first_payload(made.bitstream, {}))
     decoded = codec.reader(bitstream).read(0, bitstream.n_frames)
     result = np.empty_like(decoded)
     result[:, made.permutation] = decoded

@@ -11,7 +11,7 @@ from conftest import Finished
 from sequences import waving
 
 import gvpipe
-from gvpipe.benchmark.report import Curve
+from gvpipe.benchmark.report import BenchReport, Curve
 from gvpipe.benchmark.reproduction.claims import (
     AT_LEAST,
     AT_MOST,
@@ -107,6 +107,26 @@ def test_results_rest_on_curves_that_are_there(lab: Lab, tmp_path: Path) -> None
     written = json.loads((tmp_path / "out" / "reproduction.json").read_text())
     assert {one["id"]: one["state"] for one in written["papers"]["laplacian"]} == states
     assert (tmp_path / "out" / "reproduction.md").read_text().count("\n| ") == len(states) + 1
+
+
+def test_a_later_run_keeps_what_it_does_not_measure(lab: Lab, tmp_path: Path) -> None:
+    """Outcomes of other papers stay; --again forgets the curves of its codecs alone, and a run without it goes on."""
+    data, out = tmp_path / "none", tmp_path / "out"
+    for folder in (data, out):
+        folder.mkdir()
+    report_of([curve("famc", 1.0), curve("laplacian:operator=tutte", 2.0)]).write(out / "curves.json")
+    reproduce(["laplacian"], data, out=out)
+    reproduce(["pdct"], data, out=out, again=["laplacian"])
+    written = json.loads((out / "reproduction.json").read_text())
+    assert list(written["papers"]) == ["laplacian", "pdct"]
+    assert [one.codec for one in BenchReport.read(out / "curves.json").curves] == ["famc"]
+    reproduce(["pdct"], data, out=out, again=["all"])
+    assert BenchReport.read(out / "curves.json").curves == []
+    with pytest.raises(InputError, match="no codec 'cobra' to measure again"):
+        reproduce(["pdct"], data, out=out, again=["cobra"])
+    (out / "reproduction.json").write_text('{"papers": {"pca": [{"id": 3}]}}')
+    with pytest.raises(InputError, match="a claim of pca has id of another type"):
+        reproduce(["pdct"], data, out=out)
 
 
 LAPLACIANS = (("tutte", "none"), ("mean-value", "none"), ("mean-value", "rigid"))

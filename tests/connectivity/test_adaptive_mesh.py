@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 from sequences import grid
 
 from gvpipe.connectivity.adaptive_mesh import decode_adaptive_mesh, encode_adaptive_mesh
-from gvpipe.connectivity.adaptive_order import decode_adaptive_order, encode_adaptive_order
+from gvpipe.connectivity.adaptive_order import decode_adaptive_order
+from gvpipe.connectivity.candidate_order import decode_candidate_order, encode_candidate_order
 from gvpipe.connectivity.welded_mesh import decode_points, encode_points
 from gvpipe.foundation.errors import CorruptFile
 
@@ -46,9 +48,9 @@ def test_what_recurs_costs_next_to_nothing() -> None:
     assert nine < 4 * one
     (points, faces), draw = sheets(9), np.random.default_rng(1)
     shuffled = np.concatenate([49 * k + draw.permutation(49) if not k else 49 * k + np.arange(49) for k in range(9)])
-    assert len(encode_adaptive_order(np.arange(len(points)), np.arange(len(points)), faces)) < 60
-    stream = encode_adaptive_order(shuffled, np.arange(len(points)), faces)
-    assert np.array_equal(decode_adaptive_order(stream, np.arange(len(points)), faces), shuffled)
+    assert len(encode_candidate_order(np.arange(len(points)), np.arange(len(points)), faces)) < 60
+    stream = encode_candidate_order(shuffled, np.arange(len(points)), faces)
+    assert np.array_equal(decode_candidate_order(stream, np.arange(len(points)), faces), shuffled)
 
 
 @pytest.mark.parametrize("reorder", [False, True])
@@ -71,13 +73,49 @@ def test_welded_meshes_choose_what_is_smaller(reorder: bool) -> None:
 def test_prefixes_and_longer_streams_are_refused() -> None:
     points, faces = sheets(2, 5)
     stream = encode_adaptive_mesh(points, faces)[0]
-    order = encode_adaptive_order(np.random.default_rng(0).permutation(50), np.arange(50), faces)
+    order = encode_candidate_order(np.random.default_rng(0).permutation(50), np.arange(50), faces)
     for wrong in [*(stream[:end] for end in range(len(stream))), stream + b"\0"]:
         with pytest.raises(CorruptFile):
             decode_adaptive_mesh(wrong)
+    for wrong in (order[:1], order[:-2], order + b"\0"):
+        with pytest.raises(CorruptFile):
+            decode_candidate_order(wrong, np.arange(50), faces)
+
+
+def test_orders_by_adaptive_ranks_are_still_read() -> None:
+    """As encoders wrote them before there were candidates."""
+    from gvpipe.connectivity.order_kernels import N_CONTEXTS, N_GROUPS, code_visits
+    from gvpipe.connectivity.vertex_order import REACH, neighbour_lists
+    from gvpipe.entropy.decision_kernels import finish, start_encoder
+    from gvpipe.entropy.number_kernels import new_number_mixing
+
+    faces, points = sheets(2, 5)[1], np.arange(50)
+    visits, state, data = np.random.default_rng(0).permutation(50), start_encoder(), np.zeros(864, np.uint8)
+    lists = neighbour_lists(np.c_[points, np.zeros((50, 2), np.int64)], faces)
+    code_visits(lists, points, REACH, new_number_mixing(N_CONTEXTS, N_GROUPS), state, data, False, visits)
+    order = data[: finish(state, data)].tobytes()
+    assert np.array_equal(decode_adaptive_order(order, points, faces), visits)
     for wrong in (order[:-2], order + b"\0"):
         with pytest.raises(CorruptFile):
-            decode_adaptive_order(wrong, np.arange(50), faces)
+            decode_adaptive_order(wrong, points, faces)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 3))
+def test_any_order_comes_back(seed: int, kind: int) -> None:
+    """Soups, seams, doubled and collapsed triangles, loose vertices; in order, shuffled, or row by row."""
+    draw = np.random.default_rng(seed)
+    n = int(draw.integers(1, 90))
+    faces = draw.integers(0, n, (int(draw.integers(0, 150)), 3))
+    points = draw.integers(0, max(n // 3, 1), n) if kind == 3 else np.arange(n)
+    visits = np.argsort(draw.integers(0, 1 + n // 4, n), kind="stable") if kind == 2 else draw.permutation(n)
+    visits = np.arange(n) if kind == 0 else visits
+    order = encode_candidate_order(visits, points, faces)
+    assert np.array_equal(decode_candidate_order(order, points, faces), visits)
+    changed = bytearray(order)
+    changed[1 + seed % (len(order) - 1)] ^= 1 + seed % 255
+    with suppress(CorruptFile):
+        assert sorted(decode_candidate_order(bytes(changed), points, faces)) == list(range(n))
 
 
 @settings(max_examples=30, deadline=None)
@@ -103,6 +141,6 @@ def test_hubs_take_no_longer_than_other_vertices() -> None:
     seconds = []
     for faces in (strip, hubs, strip, hubs):
         started = time.process_time()
-        encode_adaptive_order(np.arange(n), np.arange(n), np.minimum(faces, n - 1))
+        encode_candidate_order(np.arange(n), np.arange(n), np.minimum(faces, n - 1))
         seconds.append(time.process_time() - started)
     assert min(seconds[1::2]) < 4 * min(seconds[::2]), seconds

@@ -8,8 +8,9 @@ import zlib
 from typing import Any
 
 import pytest
+from odd_headers import first_payload
 
-from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, pack_payload, unpack_payload
+from gvpipe.container.bitstream import ENTRY, MAGIC, PREFIX, Bitstream, unpack_payload
 from gvpipe.foundation.errors import CorruptFile, FormatError, NewerVersion, TruncatedFile
 
 
@@ -20,16 +21,16 @@ def small_stream() -> Bitstream:
 
 def test_payload_round_trip() -> None:
     stream = small_stream()
-    back, extra = unpack_payload(pack_payload(stream, {"id": "abc"}))
+    back, extra = unpack_payload(first_payload(stream, {"id": "abc"}))
     assert back == dataclasses.replace(stream, video=b"") and extra.plain == {"id": "abc"}
-    assert list(back.sections) == list(stream.sections) and pack_payload(stream, {"id": "abc"}) == pack_payload(
+    assert list(back.sections) == list(stream.sections) and first_payload(stream, {"id": "abc"}) == first_payload(
         stream, {"id": "abc"}
     )
 
 
 def test_every_damage_to_a_payload_is_noticed() -> None:
     """Every prefix, every byte changed in each bit, and bytes too many."""
-    payload = pack_payload(small_stream(), {"id": "abc"})
+    payload = first_payload(small_stream(), {"id": "abc"})
     for cut in range(len(payload)):
         with pytest.raises(TruncatedFile if cut >= len(MAGIC) else FormatError):
             unpack_payload(payload[:cut])

@@ -16,6 +16,7 @@ from gvpipe.coding.registry import open_reader, segment_parts
 from gvpipe.container import mp4
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.companion import MOST, Companion
+from gvpipe.container.mp4 import BOX_UUID
 from gvpipe.container.stream_layout import INDEX_UUID
 from gvpipe.container.track_boxes import boxes_in, shifted, tracks_of
 from gvpipe.foundation.errors import CorruptFile, FormatError, InputError
@@ -113,10 +114,8 @@ def test_tracks_that_the_header_does_not_describe_are_refused(layout: str, tmp_p
     path, more = tmp_path / "a.mp4", tmp_path / "b.mp4"
     written("mcgv-1-h264", layout, path)
     written("mcgv-1-h264", layout, more, sound())
-    front = b"gvpipe\r\n" if layout != "bare" else b"gvbare\r\n"
-    if layout == "stream":
-        front = INDEX_UUID.bytes
-    data = more.read_bytes()[: more.read_bytes().index(front) - 24] + path.read_bytes()[path.read_bytes().index(front) - 24 :]
+    front = INDEX_UUID.bytes if layout == "stream" else BOX_UUID.bytes
+    data = more.read_bytes()[: more.read_bytes().index(front) - 8] + path.read_bytes()[path.read_bytes().index(front) - 8 :]
     more.write_bytes(data)
     with pytest.raises(FormatError):
         mp4.read_file(more)

@@ -24,7 +24,7 @@ from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.errors import InputError, SettingError
 from gvpipe.metrics.vertex_errors import Errors
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rate_control.quality_search import MOST_ENCODES, MOST_SCATTERED, TOLERANCE, find_quality
+from gvpipe.rate_control.quality_search import CHEAP, CLOSE, MOST_ENCODES, MOST_SCATTERED, TOLERANCE, find_quality
 from gvpipe.rate_control.search import meet
 from gvpipe.rate_control.smallest_search import find_smallest
 from gvpipe.rate_control.step_search import root_mean_square
@@ -115,6 +115,27 @@ def test_errors_that_scatter_are_met_mostly(scatter: float, least: float, growth
         n_encodes += len(tried)
     assert n_met >= least * 200
     assert n_encodes <= (3.5 if scatter == 0 else 8) * 200
+
+
+@pytest.mark.parametrize(("scatter", "close"), [(0.0, 0.95), (0.01, 0.6)])
+def test_cheap_encodes_come_within_a_percent(scatter: float, close: float) -> None:
+    """Mostly so, and always as near as dear ones within few more encodes."""
+    n_close = n_encodes = 0
+    for seed in range(100):
+        draw = random.Random(seed)
+        decades, at = draw.uniform(1.8, 3.2), draw.uniform(20, 95)
+
+        def error(quality: float, seed: int = seed, decades: float = decades) -> float:
+            noise = random.Random(f"{seed} {quality:.6f}").gauss(0, scatter)
+            return float(10 ** (1 - decades * quality / 100) * math.exp(noise))
+
+        target = Target("kg", float(10 ** (1 - decades * at / 100)))
+        best, tried = find_quality(pretend(error), target, min(draw.gauss(at, 4), 100.0), CHEAP)
+        assert target.is_met(best) and target.of(best) >= (1 - TOLERANCE) * target.value
+        n_close += target.of(best) >= (1 - CLOSE) * target.value
+        n_encodes += len(tried)
+    assert n_close >= close * 100
+    assert n_encodes <= CHEAP.encodes * 100
 
 
 def test_qualities_that_give_the_same_file_are_not_tried_for_ever() -> None:

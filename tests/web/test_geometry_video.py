@@ -26,7 +26,7 @@ from gvpipe.coding.corrections.bound import Bound, encode_corrections
 from gvpipe.coding.registry import make_codec, open_reader
 from gvpipe.coding.repeated_frames import RepeatedFrames, add_repeated_frames
 from gvpipe.container.bitstream import Bitstream
-from gvpipe.container.mp4 import read_file, write_file
+from gvpipe.container.mp4 import BOX_UUID, read_file, write_file
 from gvpipe.foundation.errors import CorruptFile
 from gvpipe.model.sequence import MeshSequence
 
@@ -293,23 +293,26 @@ def _remuxed(data: bytes) -> bytes:
     return data[:size]
 
 
+def _with_version(data: bytes, version: int) -> bytes:
+    """A file whose payload begins with another version."""
+    at = data.rindex(BOX_UUID.bytes) + 16
+    return data[:at] + bytes([version]) + data[at + 1 :]
+
+
 BROKEN: dict[str, tuple[str, Callable[[bytes], bytes]]] = {
     "empty": ("truncated", lambda data: b""),
     "half": ("truncated", lambda data: data[: len(data) // 2]),
     "one byte short": ("truncated", lambda data: data[:-1]),
     "no MP4": ("not-geometry-video", lambda data: b"<!doctype html><p>Not found</p>"),
     "stripped": ("stripped", _remuxed),
-    "foreign": ("not-geometry-video", lambda data: _remuxed(data).replace(b"gvpipe 1 ", b"someone 1")),
-    "newer": ("newer", lambda data: data.replace(b"gvpipe\r\n\x01\x00", b"gvpipe\r\n\x02\x00")),
+    "foreign": ("not-geometry-video", lambda data: _remuxed(data).replace(b"gvpipe 2 ", b"someone 2")),
+    "newer": ("newer", lambda data: _with_version(data, 3)),
+    "newer by its tag": ("newer", lambda data: data.replace(b"gvpipe 2 ", b"gvpipe 3 ")),
     "stray bytes": ("corrupt", lambda data: data + bytes(16)),
     "last section": ("corrupt", lambda data: flipped(data, len(data) - 5)),
-    "magic": ("corrupt", lambda data: flipped(data, data.index(b"gvpipe\r\n"))),
-    "table": ("corrupt", lambda data: flipped(data, data.index(b"gvpipe\r\n") + 14)),
+    "no version": ("corrupt", lambda data: _with_version(data, 255)),
+    "header": ("corrupt", lambda data: flipped(data, data.rindex(BOX_UUID.bytes) + 24)),
     "picture": ("corrupt", lambda data: flipped(data, data.index(b"mdat") + 900)),
-    "other file's id": (
-        "corrupt",
-        lambda data: data.replace(data[(i := data.index(b"gvpipe 1 ")) : i + 41], b"gvpipe 1 " + b"0" * 32),
-    ),
 }
 
 

@@ -81,6 +81,11 @@ class Settings(BaseCodec):
         return self.prediction == "blended"
 
     @property
+    def is_cheap_again(self) -> bool:
+        """Whether another encode takes little: without trajectory images, most of the first is the search for clusters."""
+        return self.is_blended and self.transform == "none"
+
+    @property
     def may_omit_pictures(self) -> bool:
         """Whether frames may be their prediction alone, where that is smaller."""
         return self.is_blended and self.transform == "none" and self.placement == AUTO

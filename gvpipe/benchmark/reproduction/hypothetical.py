@@ -29,17 +29,22 @@ RIDGE = 1e-9  # of a vector's neighbours' energy: these may depend on each other
 
 def hypothetical_rate(sequence: str, kg: float) -> Callable[[Lab], float | None]:
     """Bits per vertex and frame of the hypothetical predictor at a KG error."""
-    return lambda lab: rate_at(hypothetical_points(lab.sequence(sequence), lab), "kg", kg)
+    return lambda lab: rate_at(_points_of(sequence, lab), "kg", kg)
 
 
 def hypothetical_gain(sequence: str, other: str) -> Callable[[Lab], float | None]:
     """By how many percent its rate is below a codec's, averaged over the errors that both reach."""
 
     def measured(lab: Lab) -> float | None:
-        found = average_rate_difference(lab.points(sequence, other), hypothetical_points(lab.sequence(sequence), lab), "kg")
+        found = average_rate_difference(lab.points(sequence, other), _points_of(sequence, lab), "kg")
         return None if found is None else -found
 
     return measured
+
+
+def _points_of(name: str, lab: Lab) -> list[dict[str, Any]]:
+    sequence = lab.sequence(name)
+    return lab.memo(f"hypothetical {name}", lambda: hypothetical_points(sequence, lab))
 
 
 def hypothetical_points(sequence: MeshSequence, lab: Lab) -> list[dict[str, Any]]:

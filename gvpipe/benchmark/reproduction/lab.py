@@ -8,6 +8,7 @@ from typing import Any
 
 from gvpipe.benchmark import sweep
 from gvpipe.benchmark.report import BenchReport, Curve
+from gvpipe.coding.codec import Memo
 from gvpipe.coding.registry import codec_ids
 from gvpipe.foundation.errors import GvpipeError
 from gvpipe.foundation.progress import Progress, silent
@@ -47,6 +48,7 @@ class Lab:
         self._curves = {(curve.sequence, curve.codec): curve for curve in known}
         self._sequences: dict[str, MeshSequence] = {}
         self._progress, self._keep = progress or silent, keep
+        self.memo = Memo()  # of what claims compute of sequences, beside curves
 
     @property
     def curves(self) -> list[Curve]:

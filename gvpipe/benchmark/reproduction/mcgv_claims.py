@@ -16,7 +16,7 @@ from gvpipe.mesh.topology import adjacency, components
 
 MCGV, JPEG = "mcgv:prediction=affine", "mcgv:prediction=affine:image=jpeg"
 RMSE = "rmse"
-GV = "all 204 frames; errors at vertices, resampling's among them"
+GV = "all frames; errors at vertices, resampling's among them"
 
 
 def claims() -> list[Claim]:
@@ -25,15 +25,20 @@ def claims() -> list[Claim]:
 
 
 def _table_1() -> list[Claim]:
-    rows = {"cow": (2904, 204, 1), "chicken": (3030, 400, 41)}
+    rows = {
+        "cow": (2904, 204, 1),
+        "chicken": (3030, 400, 41),
+        "dolphin": (6180, 101, 1),
+        "dance": (7061, 201, 1),
+        "humanoid": (7646, 154, 1),
+        "snake": (9179, 134, 1),
+    }
     made = []
     for name, numbers in rows.items():
         for what, number, measure in zip(("V", "F", "CC"), numbers, (_vertices, _frames, _components), strict=True):
             text = f"{name} has {what} = {number}"
             made.append(Claim(f"mcgv-t1-{name}-{what.lower()}", "Table 1", text, number, "", ABOUT, measure(name)))
-    absent = "the sequence is not at hand"
-    names = ("dolphin", "dance", "humanoid", "snake")
-    return made + [Claim(f"mcgv-t1-{n}", "Table 1", f"sizes of {n}", None, "", note=absent) for n in names]
+    return made
 
 
 def _figures() -> list[Claim]:
@@ -113,16 +118,6 @@ def _figures() -> list[Claim]:
                 ("rt", "RT"),
             )
         ),
-        Claim(
-            "mcgv-f9-cow",
-            "Figure 9",
-            "50 % less distortion than GV at 8 bpvf, frames alone, on cow",
-            50,
-            "% of error",
-            AT_LEAST,
-            less_error("cow", JPEG, "gv:prediction=none", RMSE, 8.0),
-            GV,
-        ),
         *(
             Claim(
                 f"mcgv-f9-{name}",
@@ -130,9 +125,11 @@ def _figures() -> list[Claim]:
                 f"{number} % less distortion than GV at 8 bpvf, frames alone, on {name}",
                 number,
                 "% of error",
-                note="the sequence is not at hand",
+                AT_LEAST,
+                less_error(name, JPEG, "gv:prediction=none", RMSE, 8.0),
+                GV,
             )
-            for name, number in (("dance", 60), ("snake", 10))
+            for name, number in (("cow", 50), ("dance", 60), ("snake", 10))
         ),
         Claim(
             "mcgv-f9-p",

@@ -15,8 +15,18 @@ from gvpipe.benchmark.reproduction.hypothetical import hypothetical_gain, hypoth
 
 NAVG, LSP, RBF = (f"pca:predictor={name}" for name in ("navg", "lsp", "rbf"))
 KG = "kg"
-ABSENT = "the sequence is not at hand"
-FAMC = "FAMC is the baseline, in DCT mode"
+TIMES = {  # Table 2, ms on a Core 2 Duo at 2.53 GHz: NAVG compress, decompress, RBF compress, decompress
+    "chicken": (64030, 3268, 72088, 4524),
+    "dance": (26777, 5000, 48360, 9828),
+    "humanoid": (19032, 4774, 39671, 7768),
+    "jump": (58758, 8556, 106751, 24975),
+    "cloth": (32206, 4867, 56222, 13010),
+    "snake": (17129, 4906, 47143, 9984),
+    "walk": (95441, 17402, 196514, 41854),
+}
+LEAST = {"chicken": 60, "cow": 40}  # of Figure 5, %; others between 40 and 70
+ORDINARY = 40
+FAMC = "FAMC is the baseline, DCT with layers"
 
 
 def claims() -> list[Claim]:
@@ -36,49 +46,25 @@ def _table_1() -> list[Claim]:
     }
     made = []
     for name, (plain, kg, weighted, weighted_kg) in rows.items():
-        at_hand = name in ("chicken", "cow")
-        made.append(
-            Claim(
-                f"pca-t1-{name}-navg",
-                "Table 1",
-                f"parallelogram and NAVG take {plain} bpvf at KG {kg} on {name}",
-                plain,
-                "bpvf",
-                AT_MOST,
-                rate(name, NAVG, KG, kg) if at_hand else None,
-                "" if at_hand else ABSENT,
-            )
-        )
+        text = f"parallelogram and NAVG take {plain} bpvf at KG {kg} on {name}"
+        made.append(Claim(f"pca-t1-{name}-navg", "Table 1", text, plain, "bpvf", AT_MOST, rate(name, NAVG, KG, kg)))
         text = f"with weights known to the decoder {weighted} bpvf at KG {weighted_kg} on {name}"
-        measure = hypothetical_rate(name, weighted_kg) if at_hand else None
-        note = "computed, not decoded: no file has the weights"
-        made.append(
-            Claim(f"pca-t1-{name}-weighted", "Table 1", text, weighted, "bpvf", AT_MOST, measure, note if at_hand else ABSENT)
-        )
-        if at_hand:
-            gain = round(100 * (1 - weighted / plain), 1)
-            text = f"{name}: with weights known to the decoder {gain} % fewer bits than with NAVG"
-            made.append(
-                Claim(
-                    f"pca-t1-{name}-gain",
-                    "Table 1",
-                    text,
-                    gain,
-                    "% of rate",
-                    AT_LEAST,
-                    hypothetical_gain(name, NAVG),
-                    f"averaged over the curve; {note}",
-                )
-            )
+        measure, note = hypothetical_rate(name, weighted_kg), "computed, not decoded: no file has the weights"
+        made.append(Claim(f"pca-t1-{name}-weighted", "Table 1", text, weighted, "bpvf", AT_MOST, measure, note))
+        gain = round(100 * (1 - weighted / plain), 1)
+        text = f"{name}: with weights known to the decoder {gain} % fewer bits than with NAVG"
+        measure, note = hypothetical_gain(name, NAVG), f"averaged over the curve; {note}"
+        made.append(Claim(f"pca-t1-{name}-gain", "Table 1", text, gain, "% of rate", AT_LEAST, measure, note))
     return made
 
 
 def _figures() -> list[Claim]:
     made = [
         Claim("pca-f3", "Figure 3", "sent weights of 7 bits save rate on chicken", None, "", note="weights are not sent here"),
-        Claim("pca-f4", "Figure 4", "sent weights save nothing on cloth", None, "", note=ABSENT),
+        Claim("pca-f4", "Figure 4", "sent weights save nothing on cloth", None, "", note="weights are not sent here"),
     ]
-    for name, least in (("chicken", 60), ("cow", 40)):
+    for name in ("chicken", "dance", "jump", "cow", "snake", "cloth"):
+        least = LEAST.get(name, ORDINARY)
         made.append(
             Claim(
                 f"pca-f5-{name}",
@@ -127,31 +113,13 @@ def _figures() -> list[Claim]:
                 f"averaged over the curve; {FAMC}",
             )
         )
-    made += [Claim(f"pca-f6-{n}", "Figure 6", f"7 to 25 % less on {n}", 7, "%", note=ABSENT) for n in ABSENT_NAMES]
+    for figure, name in ((7, "dance"), (8, "cloth"), (9, "cow"), (10, "snake")):
+        for key, other, note in (("navg", NAVG, ""), ("famc", "famc", f"; {FAMC}")):
+            text = f"RBF beats {key.upper()} at all rates, on {name}"
+            measure = less_rate_overall(name, RBF, other, KG)
+            note = f"averaged over the curve{note}"
+            made.append(Claim(f"pca-f{figure}-{key}", f"Figure {figure}", text, 0, "% of rate", AT_LEAST, measure, note))
     made += [
-        Claim("pca-f7", "Figure 7", "RBF beats NAVG and FAMC at all rates, on dance", None, "", note=ABSENT),
-        Claim("pca-f8", "Figure 8", "the same on cloth", None, "", note=ABSENT),
-        Claim(
-            "pca-f9",
-            "Figure 9",
-            "RBF beats NAVG at all rates, on cow",
-            0,
-            "% of rate",
-            AT_LEAST,
-            less_rate_overall("cow", RBF, NAVG, KG),
-            "averaged over the curve",
-        ),
-        Claim(
-            "pca-f9-famc",
-            "Figure 9",
-            "RBF beats FAMC at all rates, on cow",
-            0,
-            "% of rate",
-            AT_LEAST,
-            less_rate_overall("cow", RBF, "famc", KG),
-            f"averaged over the curve; {FAMC}",
-        ),
-        Claim("pca-f10", "Figure 10", "the same on snake", None, "", note=ABSENT),
         *(
             Claim(
                 f"pca-f11-{beta}",
@@ -179,18 +147,14 @@ def _figures() -> list[Claim]:
     return made
 
 
-ABSENT_NAMES = ("dance", "jump", "snake", "cloth")
-
-
 def _table_2() -> list[Claim]:
-    """Times on a Core 2 Duo at 2.53 GHz."""
-    rows = {"navg": (NAVG, 64030, 3268), "rbf": (RBF, 72088, 4524)}
     made = []
-    for name, (codec, encode, decode) in rows.items():
-        for what, number in (("encode", encode), ("decode", decode)):
-            text = f"chicken {what}s in {number} ms with {name.upper()}"
-            note = "on another machine"
-            measure = time_of("chicken", codec, f"{what}_s")
-            made.append(Claim(f"pca-t2-{name}-{what}", "Table 2", text, number, "ms", AT_MOST, measure, note))
-    text = "times of dance, humanoid, jump, cloth, snake and walk, and of a Core i7"
-    return [*made, Claim("pca-t2-others", "Table 2", text, None, "ms", note="the sequences are not at hand")]
+    for sequence, times in TIMES.items():
+        rows = ((NAVG, "navg", "encode"), (NAVG, "navg", "decode"), (RBF, "rbf", "encode"), (RBF, "rbf", "decode"))
+        for (codec, name, what), number in zip(rows, times, strict=True):
+            text = f"{sequence} {what}s in {number} ms with {name.upper()}"
+            measure = time_of(sequence, codec, f"{what}_s")
+            key = f"pca-t2-{sequence}-{name}-{what}"
+            made.append(Claim(key, "Table 2", text, number, "ms", AT_MOST, measure, "on another machine"))
+    note = "ours are compared with the slower machine's"
+    return [*made, Claim("pca-t2-i7", "Table 2", "the same times on a Core i7", None, "ms", note=note)]

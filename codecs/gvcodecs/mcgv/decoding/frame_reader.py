@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import chain, islice
 
@@ -99,13 +99,16 @@ class McgvReader:
         bitstream, header = self._bitstream, self._header
         has_one = header.segments == 1
 
-        def decode() -> Trajectories | None:
-            return decode_transforms(bitstream, header, 0, self._bounds[1]) if has_one else None
+        with ExitStack() as stack:
+            slots, finished = stack.enter_context(self._open_surface())
+            layout = stack.enter_context(beside(lambda: read_layout(bitstream, header, slots), self._has_room(slots)))
+            blend = read_blend(bitstream, header, slots)
 
-        with beside(decode, has_one) as only, self._open_surface() as (slots, finished):
-            with beside(lambda: read_layout(bitstream, header, slots), self._has_room(slots)) as layout:
-                blend = read_blend(bitstream, header, slots)
-                samples = Samples(finished(), layout())
+            def decode() -> Trajectories | None:
+                return decode_transforms(bitstream, header, blend, 0) if has_one else None
+
+            only = stack.enter_context(beside(decode, has_one))
+            samples = Samples(finished(), layout())
             return BlendedMotion(bitstream, header, samples, blend, self._bounds, only())
 
     def _has_room(self, slots: Slots) -> bool:

@@ -42,7 +42,7 @@ def read_skin(bitstream: Bitstream) -> Skin | None:
     to_unit = _to_unit(surface.base, blend.homogeneous)
     transforms = np.tile(np.eye(4), (bitstream.n_frames, header.clusters + 1, 1, 1))
     for s, (start, stop) in enumerate(pairwise(bounds)):
-        rows = decode_transforms(bitstream, header, s, stop - start).rows(0, stop - start)
+        rows = decode_transforms(bitstream, header, blend, s).rows(0, stop - start)
         own = blend.transforms(rows).reshape(header.clusters, 4, stop - start, 3)  # y @ own
         transforms[start:stop, :-1, :3] += np.einsum("kifc,ij->fkcj", own, to_unit)
     n_vertices = bitstream.n_vertices

@@ -22,6 +22,7 @@ from gvcodecs.mcgv.motion.skinning import Blend, BlendFit
 from gvcodecs.mcgv.motion.skinning_coding import Trajectories, decode_trajectories, encode_trajectories
 from gvcodecs.mcgv.motion.weight_coding import decode_weights, encode_weights
 from gvpipe.container.bitstream import Bitstream
+from gvpipe.container.segments import segment_starts
 from gvpipe.foundation.arrays import Array, Float32, Float64
 from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.runtime.forks import kept
@@ -34,6 +35,7 @@ if TYPE_CHECKING:  # kernels import numba, which takes 0.3 s
 BYTES_PER_POINT, SECONDS_PER_POINT = 400, 1e-6
 CHUNK = 16  # frames whose transforms are made at a time
 KEPT = 1 << 22  # numbers of transforms that are kept between encodes, most
+MOST_FACTORED = 2048  # rows of transforms whose errors are weighed: more take seconds, and 8 bytes times their square
 LARGE = 1 << 14  # vertices that move; fewer do not pay for other threads
 
 
@@ -53,12 +55,14 @@ class Solved:
         weights: its section.
         matrix: of the blend, ``(P, 4K)``.
         transforms: ``(4K, 3n)`` rows of equal weight, segment after segment: a list, or made one by one.
+        factor: ``(4K, 4K)`` how their errors add up (`error_kernels.error_factor`); None of many clusters.
     """
 
     fitted: Fitted
     weights: bytes
     matrix: Rows
     transforms: Iterable[Float64]
+    factor: Float64 | None
 
 
 def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
@@ -67,7 +71,7 @@ def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
     coded = {"weights": solved.weights}
     segments: list[Trajectories] = []
     for s, transforms in enumerate(solved.transforms):
-        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step)
+        coded[f"transforms.{s}"], decoded = encode_trajectories(transforms, start.step, solved.factor, fitted.weights)
         segments.append(decoded)
         job.report("transforms", (s + 1) / (len(bounds) - 1))
     matrix, spans = solved.matrix, halves(len(base))
@@ -92,13 +96,17 @@ def code_blended(job: Job, start: Start, fitted: Fitted) -> CodedMotion:
 
 def _solve(job: Job, start: Start, fitted: Fitted) -> Solved:
     """What a blend comes to; the last one is kept, if it does not take much, since several steps are tried with one."""
+    from gvcodecs.mcgv.motion.error_kernels import error_factor
+
     kept = job.memo("solved", list[Solved])
     if kept and kept[0].fitted is fitted:
         return kept[0]
     kept.clear()
     fit = BlendFit(Blend(start.base, fitted.weights, fitted.n_clusters))
     weights = encode_weights(fitted.weights, start.points.causal_neighbours())
-    solved = Solved(fitted, weights, as_rows(fit.matrix), _fit_segments(start, fit, 4 * fitted.n_clusters))
+    n_rows, matrix = 4 * fitted.n_clusters, as_rows(fit.matrix)
+    factor = error_factor(matrix, n_rows) if n_rows <= MOST_FACTORED else None
+    solved = Solved(fitted, weights, matrix, _fit_segments(start, fit, n_rows), factor)
     if 12 * fitted.n_clusters * start.sequence.n_frames <= KEPT and not job.is_heavy:
         solved = dataclasses.replace(solved, transforms=[*solved.transforms])
         kept.append(solved)
@@ -209,17 +217,17 @@ class BlendedMotion:
         kept, trajectories = self._segment
         n_frames = self._bounds[s + 1] - self._bounds[s]
         if kept != s or trajectories is None:
-            trajectories = decode_transforms(self._bitstream, self._header, s, n_frames)
+            trajectories = decode_transforms(self._bitstream, self._header, self._blend, s)
             self._segment = (s, trajectories)
         transforms = self._blend.transforms(trajectories.rows(chunk * CHUNK, min((chunk + 1) * CHUNK, n_frames)))
         return np.ascontiguousarray(transforms.reshape(*transforms.shape[:2], -1, 3).transpose(2, 0, 1, 3))
 
 
-def decode_transforms(bitstream: Bitstream, header: Header, s: int, n_frames: int) -> Trajectories:
+def decode_transforms(bitstream: Bitstream, header: Header, blend: Blend, s: int) -> Trajectories:
     """The transforms of segment s; raises `CorruptFile`."""
-    name = f"transforms.{s}"
-    section, budget = bitstream.section(name), bitstream.budget
-    return decode_trajectories(section, header.clusters, n_frames, header.transform_step, name, budget)
+    name, bounds = f"transforms.{s}", segment_starts(bitstream.n_frames, header.segments)
+    section, n_frames, step = bitstream.section(name), bounds[s + 1] - bounds[s], header.transform_step
+    return decode_trajectories(section, blend.weights, blend.n_clusters, n_frames, step, name, budget=bitstream.budget)
 
 
 def _columns(frames: Float64) -> Float64:

@@ -3,22 +3,17 @@
 import {
   BARE_DICTIONARY as DICTIONARY,
   BARE_MAGIC as MAGIC,
-  BARE_MAX_LENGTH as MAX_LENGTH,
   BARE_WITH_SHARED as WITH_SHARED,
-  BITSTREAM_MAX_HEADER as MAX_HEADER,
-  BITSTREAM_MAX_NAME as MAX_NAME,
-  BITSTREAM_MAX_SECTIONS as MAX_SECTIONS,
   SHARED_SECTIONS_MAX_SHARED as MAX_SHARED,
 } from "../constants.js";
 import { newerContainer } from "./boxes.js";
 import { crc32 } from "./checksum.js";
+import { readCompact } from "./compact_header.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
-import { checkHeader, checkInteger, isObject } from "./header.js";
-import { inflateRaw } from "./inflate.js";
+import { isObject } from "./header.js";
 import { sha256 } from "./sha256.js";
 
-const NAME = new RegExp(`^[a-z0-9.]{1,${MAX_NAME}}$`);
 export const HASH = /^[0-9a-f]{32}$/;
 const HASH_DIGITS = 32;
 
@@ -39,33 +34,20 @@ export async function readBare(payload, find) {
   const cursor = new Cursor(payload, "header");
   cursor.take(MAGIC.length);
   const version = cursor.u16();
-  if (version > WITH_SHARED) throw newerContainer(version);
+  if (version > WITH_SHARED) throw newerContainer(version, WITH_SHARED);
   if (version < 1) throw cursor.corrupt(`version ${version}`);
   if (crc32(content) !== new DataView(payload.buffer, payload.byteOffset + content.length).getUint32(0, true)) {
     throw new GeometryVideoError("corrupt", `the checksum of its payload does not match; ${AGAIN}`);
   }
   const inner = new Cursor(content, "header");
   inner.take(cursor.position);
-  const wrong = (what) => corrupt("header", what);
-  const header = checkHeader(await inflateRaw(inner.block(), Uint8Array.from(DICTIONARY), MAX_HEADER, wrong));
-  header.container ??= {};
-  const lengths = readLengths(header);
+  const { header, lengths } = await readCompact(inner, DICTIONARY);
   const shared = version === WITH_SHARED ? await findShared(header.shared, lengths, find) : new Map();
   const sections = new Map();
   for (const [name, length] of lengths) sections.set(name, shared.get(name) ?? inner.take(length));
   inner.end();
   const sharedBytes = [...new Set(shared.values())].reduce((sum, data) => sum + data.length, 0);
   return { header, sections, sharedBytes };
-}
-
-/** Bytes of each section, in order. @returns {Map<string, number>} */
-function readLengths({ sections }) {
-  if (!isObject(sections)) throw corrupt("header", "it does not list its sections");
-  const names = Object.keys(sections);
-  if (names.length > MAX_SECTIONS || !names.every((name) => NAME.test(name))) {
-    throw corrupt("header", "the names of its sections are not of a to z, 0 to 9 and dots");
-  }
-  return new Map(names.map((name) => [name, checkInteger(sections, name, 0, MAX_LENGTH)]));
 }
 
 /** The shared sections by name, each checked. Mirrors `gvpipe.container.shared_sections`. */

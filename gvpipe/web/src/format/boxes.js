@@ -7,6 +7,7 @@ import {
   BITSTREAM_VERSION as CONTAINER_VERSION,
   MP4_BOX_UUID as UUID,
   MP4_MAX_BOXES as MAX_BOXES,
+  PLAIN_VERSION,
   STREAM_LAYOUT_INDEX_UUID as INDEX_UUID,
   STREAM_LAYOUT_MAX_INDEX as MAX_INDEX,
   STREAM_LAYOUT_ROOM_UUID as ROOM_UUID,
@@ -46,8 +47,10 @@ export function readContainer(file) {
   }
   const moov = boxes.find((box) => box.kind === "moov");
   const tag = readTag(file.subarray(moov.start, moov.end));
-  if (tag && Number(tag[1]) > CONTAINER_VERSION) throw newerContainer(tag[1]);
-  if (indices.length === 1 && boxes[2] === indices[0]) {
+  const isStream = indices.length === 1 && boxes[2] === indices[0];
+  const latest = isStream ? CONTAINER_VERSION : PLAIN_VERSION;
+  if (tag && Number(tag[1]) > latest) throw newerContainer(tag[1], latest);
+  if (isStream) {
     const box = { start: indices[0].start + INDEX_UUID.length, end: indices[0].end };
     return { ...readStream(file, box), bytes: file.length, id: tag ? tag[2] : "" };
   }
@@ -101,11 +104,11 @@ export function endOfHead(start) {
   return position + 8 + INDEX_UUID.length;
 }
 
-/** The error for a container that is not read here. */
-export function newerContainer(version) {
+/** The error for a container that is not read here. @param {number|string} version @param {number} [latest] of its layout, that is read */
+export function newerContainer(version, latest = CONTAINER_VERSION) {
   return new GeometryVideoError(
     "newer",
-    `container version ${version}, this player reads up to ${CONTAINER_VERSION}; a newer player is needed`,
+    `container version ${version}, this player reads up to ${latest}; a newer player is needed`,
   );
 }
 

@@ -1,4 +1,4 @@
-/** The payload: named sections with checksums, and a header. Mirrors `gvpipe.container.bitstream`; `docs/format.md`, section 2. */
+/** The payload of any layout: named sections, and a header. That of version 1 mirrors `gvpipe.container.bitstream`; `docs/format.md`, section 2. */
 
 import { BITSTREAM_MAGIC as MAGIC, BITSTREAM_MAX_NAME as MAX_NAME, BITSTREAM_MAX_SECTIONS as MAX_SECTIONS } from "../constants.js";
 import { isBare, readBare } from "./bare.js";
@@ -9,6 +9,7 @@ import { describedIn } from "./companions.js";
 import { Cursor } from "./cursor.js";
 import { AGAIN, GeometryVideoError, corrupt } from "./errors.js";
 import { clipName, readHeader, setFrames } from "./header.js";
+import { readPlain } from "./plain.js";
 
 /** A geometry video's header and sections, and what reading them may cost. */
 export class Payload {
@@ -37,6 +38,7 @@ export class Payload {
  */
 export async function readPayload(container, find = null) {
   if (container.payload && isBare(container.payload)) return readBarePayload(container, find);
+  if (container.payload && !isFirst(container.payload)) return readPlainPayload(container);
   const sections = container.sections ?? readPayloadSections(container.payload);
   const header = await readHeader(sections);
   if (container.frames) setFrames(header, container.frames);
@@ -53,6 +55,14 @@ export async function readPayload(container, find = null) {
   return new Payload(header, sections, budget, container.late);
 }
 
+async function readPlainPayload({ payload, bytes, videoChecksum }) {
+  const { header, sections } = await readPlain(payload);
+  if (header.container.video_crc32 !== videoChecksum) throw otherVideo();
+  const budget = new Budget(bytes);
+  budget.keepMesh(header);
+  return new Payload(header, sections, budget);
+}
+
 async function readBarePayload({ payload, bytes, videoChecksum }, find) {
   if (!find) throw new GeometryVideoError("unsupported", "it has the bare layout, of data sets; gvpipe restream makes a file of it that plays");
   const { header, sections, sharedBytes } = await readBare(payload, find);
@@ -62,6 +72,11 @@ async function readBarePayload({ payload, bytes, videoChecksum }, find) {
   const budget = new Budget(bytes + sharedBytes);
   budget.keepMesh(header);
   return new Payload(header, sections, budget);
+}
+
+/** Whether a payload begins with the magic of version 1. @param {Uint8Array} payload */
+function isFirst(payload) {
+  return MAGIC.every((byte, i) => payload[i] === byte);
 }
 
 function otherVideo() {
@@ -74,10 +89,7 @@ function readPayloadSections(payload) {
 }
 
 function readTable(cursor) {
-  const start = cursor.take(Math.min(cursor.left, MAGIC.length));
-  if (!MAGIC.every((byte, i) => start[i] === byte)) {
-    throw new GeometryVideoError("corrupt", `the payload does not start with gvpipe's magic; ${AGAIN}`);
-  }
+  cursor.take(MAGIC.length);
   const [version, count] = [cursor.u16(), cursor.u16()];
   if (version > CONTAINER_VERSION) throw newerContainer(version);
   if (version < 1 || count < 1 || count > MAX_SECTIONS) throw cursor.corrupt(`version ${version} with ${count} sections`);

@@ -3,8 +3,8 @@
  * 6.1.
  */
 
-import { VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
-import { decodeAdaptiveOrder } from "./adaptive_order.js";
+import { CANDIDATE_ORDER_MARK as MARK, VERTEX_ORDER_MAX_VERTICES as MAX_VERTICES } from "../constants.js";
+import { decodeAdaptiveOrder, decodeCandidateOrder } from "./adaptive_order.js";
 import { corrupt } from "./errors.js";
 import { decodeIntegers } from "./integers.js";
 import { decodeSeams } from "./edge_seams.js";
@@ -16,7 +16,7 @@ import { decodeOrder } from "./vertex_order.js";
  * @param {Uint8Array} order section
  * @param {Uint32Array} pointFaces (T, 3) triangles over points, smallest point first, flat
  * @param {number} nPoints P
- * @param {boolean} adaptive whether the order is that of `adaptive_order.js`
+ * @param {boolean} adaptive whether the order has adaptive ranks, as in older files
  * @returns {{faces: Uint32Array, point: Int32Array}} triangles (T, 3) over vertices, flat, and the point of each vertex (V)
  */
 export function decodeCopies(kernels, counts, copies, order, pointFaces, nPoints, adaptive) {
@@ -26,7 +26,8 @@ export function decodeCopies(kernels, counts, copies, order, pointFaces, nPoints
   const lattice = new Int32Array(3 * n); // for the walk: equal where points are
   for (let v = 0; v < n; v++) lattice[3 * v] = point[v];
   const visits = new Int32Array(n);
-  (adaptive ? decodeAdaptiveOrder : decodeOrder)(kernels, order, lattice, faces, visits);
+  const decode = adaptive ? decodeAdaptiveOrder : order[0] === MARK ? decodeCandidateOrder : decodeOrder;
+  decode(kernels, order, lattice, faces, visits);
   const rank = new Int32Array(n); // the user's vertex of each of the codec's
   visits.forEach((visit, v) => (rank[visit] = v));
   return { faces: faces.map((vertex) => rank[vertex]), point: visits.map((visit) => point[visit]) };

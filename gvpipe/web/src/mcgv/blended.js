@@ -30,7 +30,7 @@ export class BlendedMotion {
 
   decode(data, name, frames) {
     const { clusters, transformStep } = this.#header;
-    return new Trajectories(this.#kernels.fresh(), data, clusters, frames, transformStep, name, this.#budget);
+    return new Trajectories(this.#kernels.fresh(), data, this.#blend, clusters, frames, transformStep, name, this.#budget);
   }
 
   predict(trajectories, place, predicted) {

@@ -1,24 +1,28 @@
 /** A blend's transforms over a segment. Mirrors `gvcodecs.mcgv.motion.skinning_coding`; `docs/format.md`, section 5. */
 
+import { SKINNING_CODING_PREDICTED as PREDICTED } from "../constants.js";
 import { Cursor } from "../format/cursor.js";
 import { decodeBasis } from "../trajectory/basis.js";
 import { independentOrder, placed } from "../trajectory/causal_order.js";
 import { decodeVectors } from "../trajectory/coefficient_coding.js";
+import { rowOrder } from "./row_neighbours.js";
 
 export class Trajectories {
   /**
    * @param {import("../wasm/kernels.js").Kernels} kernels whose memory is for this alone
    * @param {Uint8Array} data section `transforms.s`
+   * @param {import("./skinning.js").Blend} blend whose weights give the rows' causal neighbours
    * @param {number} clusters K @param {number} frames of the segment
    * @param {number} step quantisation step, model units
    * @param {string} name of the section, for messages
    * @param {import("../format/budget.js").Budget} budget of the file
    */
-  constructor(kernels, data, clusters, frames, step, name, budget) {
-    const cursor = new Cursor(data, name);
+  constructor(kernels, data, blend, clusters, frames, step, name, budget) {
+    const isPredicted = data[0] === PREDICTED;
+    const cursor = new Cursor(isPredicted ? data.subarray(1) : data, name);
     this.basis = decodeBasis(kernels, cursor.block(), frames, 4 * clusters, step, name, 3, budget);
     /** (4K, R) flat. */
-    const order = placed(kernels, independentOrder(4 * clusters));
+    const order = placed(kernels, isPredicted ? rowOrder(blend, clusters) : independentOrder(4 * clusters));
     this.coefficients = kernels.view(decodeVectors(kernels, order, cursor.rest(), this.basis.components, step, name)).slice();
     this.n = 4 * clusters;
   }

@@ -1,0 +1,52 @@
+"""The causal neighbours of a blend's rows: rows of the same cluster, and of clusters that share many points with it.
+
+What: row i of cluster k has the rows i of up to `MOST` clusters before k, then the rows before it of k itself. The ``kalman``
+predictor (`gvpipe.trajectory.prediction`) learns their weights component after component; it starts from 0.
+Why: clusters that share points move alike. Measured: docs/experiments/mcgv-transforms.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gvcodecs.mcgv.motion.skinning import Weights
+from gvpipe.foundation.arrays import Int64
+from gvpipe.trajectory.causal_order import CausalOrder
+
+MOST = 8  # clusters; twelve are no better
+VARIANCE = 0.003  # prior variance of a weight
+
+
+def row_order(weights: Weights, n_clusters: int) -> CausalOrder:
+    """The causal order of the rows ``4 k + i`` of all clusters, by number, in one block."""
+    shared, neighbours, starts = count_shared(weights, n_clusters), list[int](), [0]
+    for k in range(n_clusters):
+        before = shared[k, :k]
+        near = np.argsort(-before, kind="stable")[:MOST]  # of equals the lower number
+        near = near[before[near] > 0]
+        for i in range(4):
+            neighbours += [*(4 * near + i).tolist(), *range(4 * k, 4 * k + i)]
+            starts.append(len(neighbours))
+    n = 4 * n_clusters
+    return CausalOrder(
+        order=np.arange(n, dtype=np.int32),
+        starts=np.array(starts, np.int32),
+        neighbours=np.array(neighbours, np.int32),
+        weights=np.zeros(len(neighbours)),
+        variances=np.full(len(neighbours), VARIANCE),
+        ring_sizes=np.zeros(n, np.int32),
+        blocks=np.array([0, n], np.int32),
+        affine=False,
+    )
+
+
+def count_shared(weights: Weights, n_clusters: int) -> Int64:
+    """``(K, K)`` how many points follow both clusters; the diagonal means nothing."""
+    clusters, used = weights.clusters.astype(np.int64), weights.weights > 0
+    counts = np.zeros(n_clusters * n_clusters, np.int64)
+    for a in range(clusters.shape[1]):
+        for b in range(a):
+            both = used[:, a] & used[:, b]
+            counts += np.bincount(n_clusters * clusters[both, a] + clusters[both, b], minlength=len(counts))
+    square = counts.reshape(n_clusters, n_clusters)
+    return np.asarray(square + square.T)
