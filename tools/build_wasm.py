@@ -47,7 +47,7 @@ RESIDUALS = ("gvpipe.trajectory.contexts.Residuals", [NUMBERS, NUMBERS, LONGS])
 INPUTS = ("gvpipe.trajectory.contexts.ContextInputs", [INTS] * 5 + [LONGS] * 3)
 STREAM = ("gvpipe.entropy.block_kernels.BlockStream", ["uint64[1]", "uint32[1]", "uint64[2]", LONGS])
 TRELLIS = ("gvpipe.entropy.learning_kernels.LearningStream", ["uint64[1]", "uint32[1]", NUMBERS])
-VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS])
+VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS, FLOATS])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
     [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],

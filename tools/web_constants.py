@@ -84,12 +84,13 @@ SHARED = {
     "gvpipe.coding.repeated_frames": "SECTION",
     "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE BYTES_PER_VALUE SECONDS_PER_VALUE "
     "BYTES_PER_ROW",
-    "gvpipe.trajectory.coefficient_coding": "MAX_VALUES TRELLIS",
+    "gvpipe.trajectory.coefficient_coding": "MAX_VALUES MOST_FLAGS",
     "gvpipe.trajectory.contexts": "PER_OCTAVE MAX_LEVEL N_CONTEXTS",
     "gvpipe.trajectory.prediction": "PREDICTORS",
     "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
-    "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS VARIANCE MIN_BLOCK CUBIC LINEAR OFFSETS",
-    "gvpipe.trajectory.trellis": "FINENESS ZEROS SHAPES",
+    "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS MORE_NEIGHBOURS VARIANCE MORE_VARIANCE MIN_BLOCK "
+    "CUBIC LINEAR OFFSETS",
+    "gvpipe.trajectory.trellis": "FINENESS ZEROS SHAPES GRADES FINDS_NOISES FALL LEAST_GRADE",
     "gvcodecs.laplacian.average_coding": "NAME SPACING FARTHEST",
     "gvcodecs.laplacian.anchors": "ANCHOR_CHOICES",
     "gvcodecs.laplacian.delta_rows": "DELTA_PREDICTIONS N_CAUSAL N_RING",

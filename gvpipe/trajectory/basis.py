@@ -8,6 +8,8 @@ energy l_k and of basis vectors of energy 1; the basis is scaled by sqrt(l_k) be
 of D in either factor costs the same (reverse water-filling). Both factors are coded as feature vectors (`coefficient_coding`):
 the coefficients along the surface, the basis along time (`temporal_neighbours`). The mean is one more column, of scale sqrt(V).
 
+A caller may let the basis err more (``coarseness``): the scales are smaller, and the decoder need not know.
+
 Components are kept while they pay: l_k > THRESHOLD (V + 3F) D^2. D is such that the error comes to what is wanted, also
 where a component leaves. After coding, coefficients are fitted anew to the decoded basis, so that what its errors span is not
 lost.
@@ -31,9 +33,10 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Float64, Floats, Int64
 from gvpipe.foundation.budget import UNLIMITED, Budget
 from gvpipe.foundation.elementary import exp2, log, log2
-from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors
+from gvpipe.trajectory.coefficient_coding import MAX_VALUES, decode_vectors, encode_vectors, stream_flags
 from gvpipe.trajectory.gram import descending_eigenvectors, gram_of_columns, is_tall, product, smaller_gram
 from gvpipe.trajectory.temporal_neighbours import temporal_order
+from gvpipe.trajectory.trellis import FINDS_NOISES
 
 THRESHOLD = 0.2
 NEGLIGIBLE = 0.01  # part of the error that all components left out may add
@@ -104,6 +107,9 @@ def reduce_trajectories(
     most: int = MAX_COMPONENTS,
     n_axes: int = 3,
     penalty: float | None = None,
+    flags: int = 0,
+    coarseness: float = 1.0,
+    point_noise: float | None = None,
 ) -> Reduced:
     """Choose the step and the components of ``trajectories (V, 3F)``, and code their basis.
 
@@ -117,16 +123,19 @@ def reduce_trajectories(
         most: components, whatever pays.
         n_axes: coordinates of a frame; 3 in all formulas here stands for it.
         penalty: of a bit of the basis, on a trellis (`gvpipe.trajectory.coefficient_coding`); ``noise`` is the basis', too.
+        flags: of its stream (`gvpipe.trajectory.trellis`).
+        coarseness: of the basis, which its scales hide from the decoder: errors of its entries, in steps.
+        point_noise: as ``noise``, of the coefficients alone.
     """
     n_points, n_coordinates = trajectories.shape
     principal = find_principal(trajectories, error)
-    basis_noise = basis_ratio**2 * (1.0 if penalty is None else noise)
-    left = (noise * n_points + basis_noise * n_coordinates) / 12
+    basis_noise = (basis_ratio * coarseness) ** 2 * (1.0 if penalty is None else noise)
+    left = ((noise if point_noise is None else point_noise) * n_points + basis_noise * n_coordinates) / 12
     step, kept = choose_step(
         principal, error, lambda step: min(most, count_components(principal, n_points, step, point_cost, entry_cost)), left
     )
     kept = min(n_components, most, len(principal.energies)) or kept
-    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio, n_axes, penalty)
+    data, basis = encode_basis(principal, kept, n_points, step * basis_ratio, n_axes, penalty, flags, coarseness)
     return Reduced(step, data, fit_coefficients(trajectories, basis), basis)
 
 
@@ -205,18 +214,26 @@ def _coarsest(is_fine: Callable[[float], bool]) -> float:
 
 
 def encode_basis(
-    principal: Principal, n_components: int, n_points: int, step: float, n_axes: int = 3, penalty: float | None = None
+    principal: Principal,
+    n_components: int,
+    n_points: int,
+    step: float,
+    n_axes: int = 3,
+    penalty: float | None = None,
+    flags: int = 0,
+    coarseness: float = 1.0,
 ) -> tuple[bytes, Basis]:
     """Code the mean and the first R principal trajectories; return the bytes and what the decoder will have.
 
-    ``penalty`` is that of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
+    ``penalty`` and ``flags`` are those of `gvpipe.trajectory.coefficient_coding.encode_vectors`, ``coarseness`` that of
+    `reduce_trajectories`.
     """
-    levels = np.rint(PER_OCTAVE * log2(np.sqrt(principal.energies[:n_components]) / step)).astype(np.int64)
+    levels = np.rint(PER_OCTAVE * log2(np.sqrt(principal.energies[:n_components]) / (step * coarseness))).astype(np.int64)
     levels = np.clip(levels, -MAX_SCALE, MAX_SCALE)
     scales = _scales(levels, n_points, step)
     columns = np.column_stack([principal.mean, principal.vectors[:, :n_components]]) * scales  # (3F, 1 + R)
-    order = temporal_order(len(columns) // n_axes, n_axes)
-    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), order, penalty=penalty)
+    order = temporal_order(len(columns) // n_axes, n_axes, bool(flags & FINDS_NOISES))
+    data, decoded = encode_vectors(columns, _basis_step(step, columns.shape), order, penalty=penalty, flags=flags)
     head = encode_integers(np.diff(levels, prepend=0))
     decoded /= scales
     return varint(n_components) + pack_block(head) + data, Basis(decoded[:, 0], decoded[:, 1:])
@@ -251,7 +268,9 @@ def decode_basis(
     if n_axes * n_frames * (n_components + 1) > MAX_VALUES:
         raise cursor.corrupt(f"{n_components} components over {n_frames} frames")
     coarse_step = _basis_step(step, (n_axes * n_frames, n_components + 1))
-    decoded = decode_vectors(cursor.rest(), n_components + 1, coarse_step, temporal_order(n_frames, n_axes), name)
+    rest = cursor.rest()
+    order = temporal_order(n_frames, n_axes, bool(stream_flags(rest, name) & FINDS_NOISES))
+    decoded = decode_vectors(rest, n_components + 1, coarse_step, order, name)
     decoded /= _scales(levels, n_points, step)
     return Basis(decoded[:, 0], decoded[:, 1:])
 

@@ -14,8 +14,8 @@ which picks one of `N_CONTEXTS` frequency tables::
               (`gvpipe.entropy.block_coder`): for every block of vectors, every component's residuals
     level   = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
 
-Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] 0, then words;
-its tables learn (`gvpipe.trajectory.trellis_coding`).
+Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] flags, then
+words; its tables learn (`gvpipe.trajectory.trellis_coding`).
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, Residuals, check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors
-from gvpipe.trajectory.trellis import FINENESS
+from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, block_steps, find_noises
 from gvpipe.trajectory.trellis_coding import TrellisDecoder, encode_numbers
 from gvpipe.trajectory.trellis_search import search
 
-TRELLIS = 0  # in place of the number of contexts: residuals on a trellis
+MOST_FLAGS = GRADES | FINDS_NOISES  # in place of the number of contexts: flags of residuals on a trellis, at most
 MAX_VALUES = 1 << 27  # of a section: vectors times components
 PART, MOST_PARTS = 4096, 16  # vectors whose residuals are decoded before they are predicted, about; parts of all of them
 
@@ -50,6 +50,7 @@ def encode_vectors(
     given: Float64 | None = None,
     penalty: float | None = None,
     factor: Float64 | None = None,
+    flags: int = 0,
 ) -> tuple[bytes, Float64]:
     """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``; on a trellis but for the last bits.
 
@@ -64,12 +65,13 @@ def encode_vectors(
         penalty: of a bit, in squared fine steps, for residuals on a trellis (`gvpipe.trajectory.trellis`, ``kalman`` alone);
             None: residuals of plain rounding.
         factor: how errors of the vectors add up, on a trellis (`gvpipe.trajectory.trellis_search.search`).
+        flags: of a stream on a trellis (`gvpipe.trajectory.trellis`).
 
     Raises:
         InputError: a value is too large for the step.
     """
     if penalty is not None:
-        return _encode_trellis(target, causal, search(target, step, causal, given, penalty, factor))
+        return _encode_trellis(target, causal, search(target, step, causal, given, penalty, factor, flags), flags)
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
     wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
@@ -88,13 +90,15 @@ def encode_vectors(
     return pack_block(head) + coder.finish(), decoded
 
 
-def _encode_trellis(target: Float64, causal: CausalOrder, found: tuple[Int64, Int64, Float64]) -> tuple[bytes, Float64]:
+def _encode_trellis(
+    target: Float64, causal: CausalOrder, found: tuple[Int64, Int64, Float64], flags: int
+) -> tuple[bytes, Float64]:
     """As `encode_vectors`, of what was found on the trellis (`search`)."""
     numbers, ranked, decoded = found
     check_residuals(ranked)
     levels = level_of(ranked)
     words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
-    return pack_block(encode_integers(np.diff(levels, prepend=0))) + varint(TRELLIS) + words, decoded
+    return pack_block(encode_integers(np.diff(levels, prepend=0))) + varint(flags) + words, decoded
 
 
 def decode_vectors(
@@ -130,9 +134,9 @@ def decode_vectors(
     if ((levels < 0) | (levels > MAX_LEVEL)).any():
         raise cursor.corrupt("a magnitude level is out of range")
     rest = cursor.rest()
-    on_trellis = rest[:1] == varint(TRELLIS)
-    coder = TrellisDecoder(rest[1:], name) if on_trellis else BlockDecoder(rest, N_CONTEXTS, name)
-    fine_step = step * FINENESS if on_trellis else step
+    flags = _flags(rest)
+    coder = BlockDecoder(rest, N_CONTEXTS, name) if flags is None else TrellisDecoder(rest[1:], name)
+    steps = block_steps(step if flags is None else step * FINENESS, len(causal.blocks) - 1, flags or 0).tolist()
     wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks
     n_vectors = int(causal.blocks[wanted])
     decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
@@ -141,19 +145,34 @@ def decode_vectors(
     residuals = Residuals(ranked, rows, inputs.usual.copy())
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
-        """Decode the residuals of blocks; return which vectors these are."""
+        """Decode the residuals of blocks, and return these."""
         if isinstance(coder, TrellisDecoder):
             coder.take(residuals, inputs, *blocks)
         else:
             coder.check(decode_residuals(residuals, inputs, coder.stream, *blocks))
-        return int(causal.blocks[blocks[0]]), int(causal.blocks[blocks[1]])
+        return blocks
 
     parts = _parts(causal.blocks[: wanted + 1])
-    for begin, end in run_ahead(take, parts, len(parts), n_threads=1):  # predict while the next ones are decoded
-        predict_vectors(causal, fine_step, ranked, decoded, None, predictor, beta, begin, end)
+    bounds = causal.blocks.tolist()
+    for first, last in run_ahead(take, parts, len(parts), n_threads=1):  # predict while the next ones are decoded
+        for b, end in pairwise([*range(first, last), last] if flags else [first, last]):
+            noises = find_noises(ranked[bounds[max(0, b - 1)] : bounds[b]], steps[b], flags or 0)
+            predict_vectors(causal, steps[b], ranked, decoded, None, predictor, beta, bounds[b], bounds[end], noises)
     if n_blocks is None:
         coder.end()
     return decoded
+
+
+def stream_flags(data: bytes, name: str) -> int:
+    """Flags of the stream of bytes that `encode_vectors` wrote; 0 if it is not on a trellis."""
+    cursor = Cursor(data, name)
+    cursor.block()
+    return _flags(cursor.rest()) or 0
+
+
+def _flags(stream: bytes) -> int | None:
+    """Flags of a stream on a trellis, or None."""
+    return stream[0] if stream and stream[0] <= MOST_FLAGS else None
 
 
 def _parts(bounds: Int32) -> list[tuple[int, int]]:

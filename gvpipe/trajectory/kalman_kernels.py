@@ -179,7 +179,7 @@ def _code_few(coding: VectorCoding, n: int, batch: Batch, components: Components
 
     A row of factors, the component that it predicts, the next row.
     """
-    n_components, noise = coding.decoded.shape[1], coding.step * coding.step
+    n_components = coding.decoded.shape[1]
     own, factors, inverses, changes = components.covariances, components.factors, components.inverses, components.changes
     for c in range(n_components):
         row = LANES * n_components * c
@@ -209,7 +209,7 @@ def _code_few(coding: VectorCoding, n: int, batch: Batch, components: Components
             store(factors, row + LANES * b, factor)
             variance = variance - covariance * factor
             guess = guess + covariance * load(changes, LANES * b)
-        store(inverses, LANES * c, same(1.0) / (same(noise) + same(1 + DOUBT) * variance))
+        store(inverses, LANES * c, same(1.0) / (same(coding.noises[c]) + same(1 + DOUBT) * variance))
         store(components.guesses, LANES * c, guess)
         for lane in range(n):
             if not components.is_wide[lane]:
@@ -225,7 +225,7 @@ def _code_many(coding: VectorCoding, n: int, n_rows: int, batch: Batch, weights:
     A component's update of the covariances, ``gains * directions'``, waits for the next component, whose products with them
     take the same loop.
     """
-    n_components, noise = coding.decoded.shape[1], same(coding.step * coding.step)
+    n_components = coding.decoded.shape[1]
     own, directions, gains, products = weights.covariances, weights.directions, weights.gains, weights.products
     _begin_weights(coding.causal.affine, n_rows, batch, weights)
     for c in range(n_components):
@@ -252,7 +252,7 @@ def _code_many(coding: VectorCoding, n: int, n_rows: int, batch: Batch, weights:
                 product, other_product = product + covariance * value, other_product + other_covariance * value
             store(products, LANES * j, product)
             store(products, LANES * j + LANES, other_product)
-        variance, change = noise, load(weights.changes, 0)  # of the component's prediction
+        variance, change = same(coding.noises[c]), load(weights.changes, 0)  # of the component's prediction
         for j in range(n_rows):
             direction = load(products, LANES * j)
             store(directions, LANES * j, direction)

@@ -39,6 +39,7 @@ def predict_vectors(
     beta: float,
     begin: int = 0,
     end: int | None = None,
+    noises: Float64 | None = None,
 ) -> None:
     """Code vectors (``target`` given), filling ``residuals`` and ``decoded``, or fill ``decoded`` from ``residuals``.
 
@@ -48,10 +49,14 @@ def predict_vectors(
         predictor: one of `PREDICTORS`.
         beta: exponent of the radial function (rbf).
         begin, end: which vectors of the order, those before ``begin`` being done; None: up to the last of ``residuals``.
+        noises: ``(R,)`` of `gvpipe.trajectory.prediction_kernels.VectorCoding`; None: the squared step.
     """
     from gvpipe.trajectory import kalman_kernels, prediction_kernels
 
-    coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, np.zeros((0, 0)) if target is None else target)
+    if noises is None:
+        noises = np.full(decoded.shape[1], step * step)
+    wanted = np.zeros((0, 0)) if target is None else target
+    coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, wanted, noises)
     stop = len(residuals) if end is None else end
     if predictor == "kalman":
         kalman_kernels.predict_kalman(coding, begin, stop)

@@ -30,6 +30,7 @@ class VectorCoding(NamedTuple):
         residuals: ``(m, R)`` of the first m vectors of the order, in steps.
         decoded: ``(n, R)`` components, by vector, in the order of transmission. Given vectors are there already.
         target: ``(n, R)`` what to code; ``(0, 0)``: decode.
+        noises: ``(R,)`` variances of what no weights explain, of ``kalman``, squared units of the components.
     """
 
     causal: CausalOrder
@@ -37,6 +38,7 @@ class VectorCoding(NamedTuple):
     residuals: Int64
     decoded: Float64
     target: Float64
+    noises: Float64
 
 
 class LeastSquares(NamedTuple):

@@ -17,8 +17,8 @@ import numpy as np
 from gvpipe.trajectory.causal_order import CausalOrder
 
 KEPT = 8  # orders: segments and short files have few lengths
-MAX_NEIGHBOURS = 6  # frames that predict a frame
-VARIANCE = 0.02  # prior variance of a weight
+MAX_NEIGHBOURS, MORE_NEIGHBOURS = 6, 8  # frames that predict a frame; where noises are found
+VARIANCE, MORE_VARIANCE = 0.02, 0.3  # prior variance of a weight; where noises are found
 MIN_BLOCK = 48  # vectors coded at once, at least
 CUBIC = {-3: -1 / 16, -1: 9 / 16, 1: 9 / 16, 3: -1 / 16}  # interpolates a cubic half way; offsets in steps
 LINEAR = {-1: 0.5, 1: 0.5}
@@ -26,13 +26,17 @@ OFFSETS = (-1, 1, -3, 3, -2, -5, 5, -4)  # frames that may be decoded, those tha
 
 
 @functools.lru_cache(KEPT)
-def temporal_order(n_frames: int, n_axes: int = 3) -> CausalOrder:
+def temporal_order(n_frames: int, n_axes: int = 3, finds_noises: bool = False) -> CausalOrder:
     """Return the order of the A F vectors of ``n_frames`` frames with A axes; it must not be changed.
+
+    ``finds_noises``: of residuals that say how noisy a component is (`gvpipe.trajectory.trellis.FINDS_NOISES`). Weights then
+    start less sure, and there are more of them.
 
     Examples:
         >>> (temporal_order(5).order[::3] // 3).tolist()
         [0, 4, 2, 1, 3]
     """
+    n_near, variance = (MORE_NEIGHBOURS, MORE_VARIANCE) if finds_noises else (MAX_NEIGHBOURS, VARIANCE)
     order, weights_of = [0], [dict[int, float]()]  # frame to weight
     is_done = {0}
     top = 1 << max(0, (n_frames - 1).bit_length() - 1)
@@ -43,7 +47,7 @@ def temporal_order(n_frames: int, n_axes: int = 3) -> CausalOrder:
     bounds = [0]
     for step, frames in levels:
         for frame in frames:
-            near = [o for o in OFFSETS if frame + o * step in is_done][:MAX_NEIGHBOURS]
+            near = [o for o in OFFSETS if frame + o * step in is_done][:n_near]
             prior = next((p for p in (CUBIC, LINEAR, {-1: 1.0}) if p.keys() <= set(near)), {})
             order.append(frame)
             weights_of.append({frame + o * step: prior.get(o, 0.0) for o in near})
@@ -60,7 +64,7 @@ def temporal_order(n_frames: int, n_axes: int = 3) -> CausalOrder:
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         neighbours=neighbours.astype(np.int32),
         weights=weights.astype(np.float64),
-        variances=np.full(len(weights), VARIANCE),
+        variances=np.full(len(weights), variance),
         ring_sizes=np.minimum(counts, 2).astype(np.int32),
         blocks=(n_axes * np.array(bounds)).astype(np.int32),
         affine=False,

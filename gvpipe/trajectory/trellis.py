@@ -20,10 +20,12 @@ import numpy as np
 
 from gvpipe.entropy import parametric_tables
 from gvpipe.entropy.tokens import MAX_TOKENS
-from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.contexts import N_CONTEXTS
 
 FINENESS = 21 / 32  # of a step
+GRADES, FINDS_NOISES = 1, 2  # flags of a stream: steps by block (`block_steps`), noises by component (`find_noises`)
+FALL, LEAST_GRADE = 0.96, 5 / 8  # of a block's step, in that of the next; in that of the last
 N_STATES, N_QUANTISERS = 8, 2
 FEEDBACK, PARITY = 5, 2  # of the code: state s leads to ``(s >> 1) ^ FEEDBACK (s & 1) ^ PARITY (k & 1)``
 ZEROS = (  # first tables (`parametric_tables.table`): of each quantiser, by the context of the forecast
@@ -31,6 +33,39 @@ ZEROS = (  # first tables (`parametric_tables.table`): of each quantiser, by the
     (255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1),
 )
 SHAPES = (0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 6, 8, 10, 12, 14, 17, 19, 21, 23, 24, 25, 26, 27, 28, 29)
+
+
+def block_steps(step: float, n_blocks: int, flags: int) -> Float64:
+    """Steps ``(B,)`` of blocks.
+
+    With `GRADES`, earlier blocks have finer steps: later vectors are predicted from theirs, and their errors go on.
+
+    Examples:
+        >>> block_steps(1.0, 3, GRADES)
+        array([0.9216, 0.96  , 1.    ])
+    """
+    steps, grade = np.full(n_blocks, step), 1.0
+    for b in range(n_blocks - 1, -1, -1) if flags & GRADES else ():
+        steps[b] = step * grade
+        grade = max(LEAST_GRADE, FALL * grade)
+    return steps
+
+
+def find_noises(before: Int64, step: float, flags: int) -> Float64:
+    """Variances ``(R,)`` of what the weights of ``kalman`` do not explain, squared units of the components.
+
+    With `FINDS_NOISES`, what a component came out at in the block before adds to that of rounding.
+
+    Args:
+        before: ``(m, R)`` residuals of the block before, in fine steps; m is 0 before the first.
+        step: the fine one.
+        flags: of the stream.
+    """
+    noises = np.full(before.shape[1], step * step)
+    if flags & FINDS_NOISES and len(before):
+        means = np.abs(before).sum(axis=0) / len(before)
+        noises *= 1 + np.square(means / 4)
+    return noises
 
 
 @functools.cache

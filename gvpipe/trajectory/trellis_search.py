@@ -22,7 +22,7 @@ from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors
-from gvpipe.trajectory.trellis import FINENESS, first_tables
+from gvpipe.trajectory.trellis import FINENESS, block_steps, find_noises, first_tables
 
 BASIS_PENALTY, PENALTY = 0.25, 0.22  # of a bit that do best: of a basis, of coefficients
 N_PRICED = 64  # magnitudes that have a price of their own
@@ -36,6 +36,7 @@ def search(
     given: Float64 | None,
     penalty: float,
     factor: Float64 | None = None,
+    flags: int = 0,
 ) -> tuple[Int64, Int64, Float64]:
     """Return the integers k and the residuals r, both ``(m, R)`` by rank, and what they decode to ``(n, R)``.
 
@@ -45,6 +46,7 @@ def search(
         penalty: of a bit, in squared fine steps.
         factor: M ``(m, m)``, lower triangular, by rank. An error e ``(m, R)`` of the vectors counts as ``|M e|^2``, and each
             vector makes up for the errors of those before, as far as it can. None: an error counts as ``|e|^2``.
+        flags: of the stream (`gvpipe.trajectory.trellis`).
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
     from gvpipe.trajectory.prediction_kernels import VectorCoding
@@ -53,14 +55,22 @@ def search(
     shape = len(causal.order), target.shape[1]
     plain, residuals = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
     decoded, found = (np.zeros(target.shape) if given is None else given.copy() for _ in range(2))
-    predict_vectors(causal, step, plain, decoded, target, "kalman", 0.0)
+    bounds = [0, *causal.blocks.tolist()]
+    blocks = [*zip(bounds, bounds[1:], bounds[2:], block_steps(step, len(bounds) - 2, flags).tolist(), strict=False)]
+    for before, begin, end, own in blocks:
+        noises = find_noises(plain[before:begin], own, flags)
+        predict_vectors(causal, own, plain, decoded, target, "kalman", 0.0, begin, end, noises)
     check_residuals(plain)  # what follows holds for smaller ones alone
     fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
     check_residuals(fine)
     inputs = context_inputs(causal, len(target), level_of(fine), len(causal.blocks) - 1)
-    coding = VectorCoding(causal, step * FINENESS, residuals, found, target)
+    contexts, numbers = find_all_contexts(fine, inputs), np.zeros(shape, np.int64)
     weights = np.zeros((0, 0)) if factor is None else factor
-    return search_paths(coding, find_all_contexts(fine, inputs), _prices(), penalty, weights), residuals, found
+    for before, begin, end, own in blocks:
+        noises = find_noises(residuals[before:begin], own * FINENESS, flags)
+        coding = VectorCoding(causal, own * FINENESS, residuals, found, target, noises)
+        search_paths(coding, contexts, _prices(), penalty, weights, begin, end, numbers)
+    return numbers, residuals, found
 
 
 @functools.cache

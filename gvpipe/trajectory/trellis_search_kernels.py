@@ -51,8 +51,10 @@ class Paths(NamedTuple):
 
 
 @compiled
-def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float, factor: Float64) -> Int64:
-    """Fill ``coding.residuals (m, R)`` and ``coding.decoded``; return the integers k ``(m, R)``.
+def search_paths(
+    coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float, factor: Float64, begin: int, end: int, found: Int64
+) -> None:
+    """Fill ``coding.residuals (m, R)``, ``coding.decoded`` and ``found (m, R)``, the integers k, of ranks ``begin`` to ``end``.
 
     Args:
         coding: ``step`` is the fine one.
@@ -61,10 +63,9 @@ def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty
         penalty: of a bit.
         factor: ``(m, m)`` of `gvpipe.trajectory.trellis_search.search`, or ``(0, 0)``.
     """
-    n_ranks, n_components = coding.residuals.shape
-    paths, found = _empty_paths(n_components, most_neighbours(coding)), np.zeros((n_ranks, n_components), np.int64)
-    aims = np.zeros(n_components)
-    for rank in range(n_ranks):
+    n_components = coding.residuals.shape[1]
+    paths, aims = _empty_paths(n_components, most_neighbours(coding)), np.zeros(n_components)
+    for rank in range(begin, end):
         weight = _aim(coding, rank, factor, aims)
         n = _begin(coding, rank, paths)
         for c in range(n_components):
@@ -80,7 +81,6 @@ def search_paths(coding: VectorCoding, contexts: UInt8, prices: Float64, penalty
             coding.decoded[coding.causal.order[rank], c] = paths.values[c, state]
             state = paths.before[c, state]
             coding.residuals[rank, c] = residual_of(number, state)
-    return found
 
 
 @compiled
@@ -144,7 +144,7 @@ def _predict(coding: VectorCoding, rank: int, c: int, n: int, paths: Paths) -> f
             store(own, k * width + at, column)
             store(following, at, load(following, at) + column * value)
     store(paths.guesses, 0, guesses)
-    variance = coding.step * coding.step
+    variance: float = coding.noises[c]
     for j in range(n):
         variance += (1 + DOUBT) * following[j] * near[j]
     inverse = same(1 / variance)

@@ -7,8 +7,9 @@ import pytest
 
 from gvpipe.foundation.errors import CorruptFile, InputError
 from gvpipe.trajectory import coefficient_coding
-from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
+from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors, stream_flags
 from gvpipe.trajectory.temporal_neighbours import temporal_order
+from gvpipe.trajectory.trellis import FINDS_NOISES, GRADES, find_noises
 
 
 def test_rows_come_back_within_a_step_and_a_prefix_of_blocks_alone() -> None:
@@ -50,13 +51,36 @@ def test_a_trellis_takes_fewer_bits_at_the_same_error() -> None:
     assert finer < size
 
 
+@pytest.mark.parametrize("flags", [GRADES, FINDS_NOISES, GRADES | FINDS_NOISES])
+def test_flags_of_a_stream(flags: int) -> None:
+    """They come back, and so do the vectors; a prefix of blocks decodes alone; early blocks err less where steps are graded."""
+    rng = np.random.default_rng(5)
+    target = rng.normal(0, 3, (1200, 9)).cumsum(axis=0) * 0.6 ** np.arange(9)
+    causal = temporal_order(400, finds_noises=bool(flags & FINDS_NOISES))
+    data, decoded = encode_vectors(target, 0.1, causal, penalty=0.2, flags=flags)
+    assert stream_flags(data, "x") == flags
+    assert np.allclose(decode_vectors(data, 9, 0.1, causal, "x"), decoded, rtol=0, atol=1e-7)
+    part = decode_vectors(data, 9, 0.1, causal, "x", n_blocks=3)
+    early, late = causal.order[: causal.blocks[3]], causal.order[causal.blocks[-2] :]
+    assert np.allclose(part[early], decoded[early], rtol=0, atol=1e-7)
+    errors = [np.square(decoded[ranks] - target[ranks]).mean() for ranks in (early, late)]
+    assert (errors[0] < 0.9 * errors[1]) == bool(flags & GRADES)
+
+
+def test_noises_follow_the_residuals_of_the_block_before() -> None:
+    before = np.array([[4, 0], [-12, 0]])
+    assert find_noises(before, 0.5, FINDS_NOISES).tolist() == [0.25 * (1 + 4), 0.25]
+    assert find_noises(before, 0.5, GRADES).tolist() == find_noises(before[:0], 0.5, FINDS_NOISES).tolist() == [0.25, 0.25]
+
+
+@pytest.mark.parametrize("flags", [0, GRADES | FINDS_NOISES])
 @pytest.mark.parametrize("penalty", [None, 0.2])
-def test_parts_that_are_decoded_ahead(penalty: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_that_are_decoded_ahead(penalty: float | None, flags: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many vectors are decoded before they are predicted, the values are the same to the bit; damage is found."""
     rng = np.random.default_rng(3)
     causal = temporal_order(200)
     target = rng.normal(0, 3, (600, 9)).cumsum(axis=0)
-    data, _ = encode_vectors(target, 0.01, causal, penalty=penalty)
+    data, _ = encode_vectors(target, 0.01, causal, penalty=penalty, flags=flags)
     whole = decode_vectors(data, 9, 0.01, causal, "x")
     assert len(causal.blocks) > 4
     for part in (1, 50, 130, 599):

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -29,18 +29,21 @@ from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.mesh.hierarchy_kernels import Hierarchy
 from gvpipe.model.sequence import MeshSequence
 from gvpipe.runtime.segment_map import map_segments
-from gvpipe.trajectory.basis import MAX_COMPONENTS, THRESHOLD, Reduced, reduce_trajectories
+from gvpipe.trajectory.basis import MAX_COMPONENTS, Reduced, reduce_trajectories
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
 from gvpipe.trajectory.coefficient_coding import encode_vectors
 from gvpipe.trajectory.prediction import PREDICTORS
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
+from gvpipe.trajectory.trellis import FINDS_NOISES, GRADES, block_steps
 from gvpipe.trajectory.trellis_search import BASIS_PENALTY, PENALTY
 
 QUANTISERS = ("trellis", "plain")
 NOISE, COST = 1.15, 0.22  # on a trellis: squared error in that of rounding to the step; of a component (`count_components`)
-LEFT = 0.93  # part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
+COARSER = 0.3  # part by which the basis errs more where its entries are few: at equal slopes, since they cost many bits
+# part of the error asked of `reduce_trajectories` that is left: small coefficients err by less than steps do
+LEFT, LEFT_ON_TRELLIS = 0.93, 0.88
 
 
 @dataclass(frozen=True)
@@ -157,19 +160,33 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
     """Code the frames of a span."""
     codec, still = segments.codec, segments.still
     start, stop = span
-    error = (segments.target_error / LEFT) ** 2 * still.n_moving * (stop - start)
-    noise, cost = (NOISE, COST) if codec.on_trellis else (1.0, THRESHOLD)
+    left = LEFT_ON_TRELLIS if codec.on_trellis else LEFT
+    error = (segments.target_error / left) ** 2 * still.n_moving * (stop - start)
+    settings = _trellis_settings(still, segments.causal, stop - start) if codec.on_trellis else {}
     reduced = reduce_trajectories(
         read_trajectories(segments.sequence, start, stop, segments.moving),
         error,
         codec.components,
-        point_cost=cost,
-        entry_cost=cost,
-        noise=noise,
         most=still.most_components,
-        penalty=BASIS_PENALTY if codec.on_trellis else None,
+        **settings,
     )  # the trajectories go: what follows needs as much memory again
     return _Segment(reduced.step, reduced.basis, _encode_coefficients(codec, reduced, still, segments.causal))
+
+
+def _trellis_settings(still: StillPoints, causal: CausalOrder, n_frames: int) -> dict[str, Any]:
+    """Settings of `reduce_trajectories` for residuals on a trellis."""
+    squares = np.square(block_steps(1.0, len(causal.blocks) - 1, GRADES))
+    mean = float(squares @ np.diff(causal.blocks)) / still.n_moving
+    coarseness = 1 + COARSER * min(max(still.n_moving / (3 * n_frames) - 1, 0.0), 1.0)
+    return {
+        "point_cost": COST * mean,
+        "entry_cost": COST,
+        "noise": NOISE,
+        "point_noise": NOISE * mean,
+        "penalty": BASIS_PENALTY,
+        "flags": FINDS_NOISES,
+        "coarseness": coarseness,
+    }
 
 
 def _encode_coefficients(codec: Pca, reduced: Reduced, still: StillPoints, causal: CausalOrder) -> bytes:
@@ -178,5 +195,5 @@ def _encode_coefficients(codec: Pca, reduced: Reduced, still: StillPoints, causa
     if codec.predictor == "lsp":  # section 3.4: the small ones first
         wanted = np.ascontiguousarray(wanted[:, ::-1])
         given = None if given is None else np.ascontiguousarray(given[:, ::-1])
-    penalty = PENALTY if codec.on_trellis else None
-    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given, penalty)[0]
+    penalty, flags = (PENALTY, GRADES) if codec.on_trellis else (None, 0)
+    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given, penalty, flags)[0]

@@ -303,7 +303,7 @@ export const BASIS_BYTES_PER_ROW = 520;
 
 // gvpipe.trajectory.coefficient_coding
 export const COEFFICIENT_CODING_MAX_VALUES = 134217728;
-export const COEFFICIENT_CODING_TRELLIS = 0;
+export const COEFFICIENT_CODING_MOST_FLAGS = 3;
 
 // gvpipe.trajectory.contexts
 export const CONTEXTS_PER_OCTAVE = 16;
@@ -321,7 +321,9 @@ export const STILL_POINTS_SECONDS_PER_PRODUCT = 1e-09;
 
 // gvpipe.trajectory.temporal_neighbours
 export const TEMPORAL_NEIGHBOURS_MAX_NEIGHBOURS = 6;
+export const TEMPORAL_NEIGHBOURS_MORE_NEIGHBOURS = 8;
 export const TEMPORAL_NEIGHBOURS_VARIANCE = 0.02;
+export const TEMPORAL_NEIGHBOURS_MORE_VARIANCE = 0.3;
 export const TEMPORAL_NEIGHBOURS_MIN_BLOCK = 48;
 export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [1, 0.5625], [3, -0.0625]]);
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
@@ -331,6 +333,10 @@ export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
 export const TRELLIS_FINENESS = 0.65625;
 export const TRELLIS_ZEROS = [[255, 255, 254, 252, 247, 242, 235, 224, 206, 184, 152, 118, 88, 66, 49, 35, 26, 19, 14, 10, 8, 7, 6, 5, 4, 3, 2], [255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1]];
 export const TRELLIS_SHAPES = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 6, 8, 10, 12, 14, 17, 19, 21, 23, 24, 25, 26, 27, 28, 29];
+export const TRELLIS_GRADES = 1;
+export const TRELLIS_FINDS_NOISES = 2;
+export const TRELLIS_FALL = 0.96;
+export const TRELLIS_LEAST_GRADE = 0.625;
 
 // gvcodecs.laplacian.average_coding
 export const LAPLACIAN_AVERAGE_CODING_NAME = "average";

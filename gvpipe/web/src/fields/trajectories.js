@@ -44,7 +44,8 @@ function decodeCoefficients(data, count, step, { kernels, causal, name }) {
   const [order, from, to] = [kernels.view(causal[0]), kernels.view(residuals), kernels.view(ranked)];
   order.forEach((row, rank) => to.set(from.subarray(row * count, (row + 1) * count), rank * count));
   const decoded = kernels.array("float64", [rows, count]);
-  const coding = [...causal, step, ranked, decoded, kernels.array("float64", [0, 0])];
+  const noises = kernels.array("float64", [count], new Float64Array(count).fill(step * step));
+  const coding = [...causal, step, ranked, decoded, kernels.array("float64", [0, 0]), noises];
   inBlocks(rows, (first, end) => kernels.call("predict_kalman", ...coding, first, end));
   return decoded;
 }

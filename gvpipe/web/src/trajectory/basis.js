@@ -12,7 +12,7 @@ import {
 import { Cursor } from "../format/cursor.js";
 import { decodeIntegers } from "../format/integers.js";
 import { placed } from "./causal_order.js";
-import { MAX_VALUES, decodeVectors } from "./coefficient_coding.js";
+import { MAX_VALUES, decodeVectors, findsNoises } from "./coefficient_coding.js";
 import { temporalOrder } from "./temporal_neighbours.js";
 
 /** 2 ** (i / PER_OCTAVE), rounded correctly: browsers' own powers need not be. */
@@ -49,8 +49,9 @@ export function decodeBasis(kernels, data, frames, points, step, name, axes = 3,
   const width = components + 1;
   if (axes * frames * width > MAX_VALUES) throw cursor.corrupt(`${components} components over ${frames} frames`);
   const coarse = step / Math.sqrt(Math.max(LEAST_OUTSIDE, 1 - width / (axes * frames)));
-  const order = placed(kernels, temporalOrder(frames, axes));
-  const decoded = decodeVectors(kernels, order, cursor.rest(), width, coarse, name);
+  const rest = cursor.rest();
+  const order = placed(kernels, temporalOrder(frames, axes, findsNoises(rest, name)));
+  const decoded = decodeVectors(kernels, order, rest, width, coarse, name);
   const columns = kernels.view(decoded).slice();
   kernels.free(...order, decoded);
   for (let i = 0; i < columns.length; i++) columns[i] /= scales[i % width];

@@ -5,11 +5,15 @@
 
 import {
   COEFFICIENT_CODING_MAX_VALUES as MAX_VALUES,
-  COEFFICIENT_CODING_TRELLIS as TRELLIS,
+  COEFFICIENT_CODING_MOST_FLAGS as MOST_FLAGS,
   CONTEXTS_MAX_LEVEL as MAX_LEVEL,
   CONTEXTS_N_CONTEXTS as N_CONTEXTS,
   CONTEXTS_PER_OCTAVE as PER_OCTAVE,
+  TRELLIS_FALL as FALL,
+  TRELLIS_FINDS_NOISES as FINDS_NOISES,
   TRELLIS_FINENESS as FINENESS,
+  TRELLIS_GRADES as GRADES,
+  TRELLIS_LEAST_GRADE as LEAST_GRADE,
 } from "../constants.js";
 import { BlockStream } from "../format/block_stream.js";
 import { Cursor } from "../format/cursor.js";
@@ -54,7 +58,8 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
     usual[c] = tables.levels[level];
   }
   const rest = cursor.rest();
-  const onTrellis = rest[0] === TRELLIS;
+  const flags = flagsOf(rest);
+  const onTrellis = flags !== null;
   const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const wanted = blocks ?? bounds.shape[0] - 1;
   const decoded = given ?? kernels.array("float64", [n, components]);
@@ -69,11 +74,54 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   }
   if (blocks === null) stream.end();
   const target = kernels.array("float64", [0, 0]);
-  const coding = [...causal, onTrellis ? step * FINENESS : step, residuals, decoded, target];
+  const noises = kernels.array("float64", [components]);
   const last = predictor === "rbf" ? [beta] : [];
-  yield* blockSteps(residuals.shape[0], (first, end) => kernels.call(`predict_${predictor}`, ...coding, first, end, ...last));
-  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...known, target);
+  const fine = onTrellis ? step * FINENESS : step;
+  const steps = stepsOf(fine, bounds.shape[0] - 1, flags);
+  for (const [first, end, before] of flags ? runs(kernels.view(bounds), wanted) : [[0, vectors, 0]]) {
+    const own = flags ? steps.shift() : fine;
+    kernels.view(noises).set(noisesOf(kernels, residuals, [before, first], own, flags));
+    const coding = [...causal, own, residuals, decoded, target, noises];
+    yield* blockSteps(first, end, (from, to) => kernels.call(`predict_${predictor}`, ...coding, from, to, ...last));
+  }
+  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...known, target, noises);
   return decoded;
+}
+
+/** Whether the stream of bytes of vectors says how noisy their components are. Mirrors `stream_flags`. */
+export function findsNoises(data, name) {
+  const cursor = new Cursor(data, name);
+  cursor.block();
+  return (flagsOf(cursor.rest()) & FINDS_NOISES) !== 0;
+}
+
+/** Flags of a stream on a trellis, or null. */
+function flagsOf(stream) {
+  return stream[0] <= MOST_FLAGS ? stream[0] : null;
+}
+
+/** Begin and end of the first blocks, and the begin of the block before. */
+function runs(bounds, wanted) {
+  return Array.from({ length: wanted }, (_, b) => [bounds[b], bounds[b + 1], bounds[Math.max(0, b - 1)]]);
+}
+
+/** Steps of blocks. Mirrors `gvpipe.trajectory.trellis.block_steps`. */
+function stepsOf(step, blocks, flags) {
+  const steps = new Array(blocks).fill(step);
+  for (let b = blocks - 1, grade = 1; flags & GRADES && b >= 0; b--, grade = Math.max(LEAST_GRADE, FALL * grade)) steps[b] = step * grade;
+  return steps;
+}
+
+/** Variances of what weights do not explain, from the residuals of the block before. Mirrors `gvpipe.trajectory.trellis.find_noises`. */
+function noisesOf(kernels, residuals, [before, first], step, flags) {
+  const components = residuals.shape[1];
+  const noises = new Float64Array(components).fill(step * step);
+  if (!(flags & FINDS_NOISES) || before === first) return noises;
+  const words = kernels.words(residuals); // little-endian halves of int64
+  const sums = new Float64Array(components);
+  for (let i = 2 * before * components, c = 0; i < 2 * first * components; i += 2, c = (c + 1) % components)
+    sums[c] += Math.abs(words[i + 1] * 2 ** 32 + (words[i] >>> 0));
+  return noises.map((noise, c) => noise * (1 + (sums[c] / (first - before) / 4) ** 2));
 }
 
 /**
@@ -82,13 +130,13 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
  * @param {number} n @param {(first: number, end: number) => unknown} call false ends it @returns {boolean}
  */
 export function inBlocks(n, call) {
-  return finish(blockSteps(n, call));
+  return finish(blockSteps(0, n, call));
 }
 
 /** `inBlocks` in steps. @yields after a call */
-function* blockSteps(n, call) {
+function* blockSteps(begin, n, call) {
   let size = LEAST_VECTORS;
-  for (let first = 0, end = 0; first < n; first = end) {
+  for (let first = begin, end = begin; first < n; first = end) {
     end = Math.min(first + size, n);
     const started = performance.now();
     if (call(first, end) === false) return false;
