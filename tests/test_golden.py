@@ -28,6 +28,7 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "laplacian-1-tutte": ("laplacian", {"operator": "tutte"}),
     "mcgv-1-affine": ("mcgv", {"clusters": 5, "prediction": "affine", "placement": "halves"}),
     "mcgv-1-charts": ("mcgv", {"clusters": 5, "profile": "precise", "placement": "charts"}),
+    "mcgv-1-fitted-seams": ("mcgv", {"gop": 5, "placement": "halves"}),
     "mcgv-1-h264": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "mcgv-1-jpeg": ("mcgv", {"clusters": 5, "image": "jpeg", "reorder": True, "placement": "halves"}),
     "mcgv-1-klt": ("mcgv", {"transform": "klt", "segment": 7, "reorder": True}),

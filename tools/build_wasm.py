@@ -101,6 +101,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
         "bool",
         LONGS,
     ],
+    "gvpipe.connectivity.fitted_kernels.code_fitted": [ENTRIES, TRIANGLES, LONGS, MIXING, LONGS, BYTES, "bool", NUMBERS],
     "gvpipe.connectivity.position_kernels.code_positions": [ENTRIES, MIXING, LONGS, BYTES, "bool", NUMBERS],
     "gvpipe.connectivity.cell_kernels.code_cells": [
         SERIAL,

@@ -2,7 +2,7 @@
 
 Draco codes connectivity alone (`topology_only`); positions follow, in the order of `gvpipe.mesh.entry_kernels`. Why: objects
 recur, and grids are regular. What followed the last residuals before, and coordinates that were seen before, predict the next
-ones (`position_kernels`), where Draco has one table for all.
+ones (`fitted_kernels`), where Draco has one table for all. Older streams have no forecast (`position_kernels`).
 
 Stream: [varint] P; blocks: Draco's stream, merges, loose triangles; [varint] loose triangles; decisions
 (`gvpipe.entropy.decision_kernels`) to the end.
@@ -18,7 +18,7 @@ from gvpipe.connectivity.base_mesh import MAX_PER_BYTE, check_draco_header
 from gvpipe.connectivity.topology_only import decode_triangles, encode_triangles
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.cursor import Cursor, pack_block, varint
-from gvpipe.foundation.arrays import Array, Int64
+from gvpipe.foundation.arrays import Array, Int32, Int64
 from gvpipe.mesh.topology import opposite_corners
 
 if TYPE_CHECKING:
@@ -35,25 +35,28 @@ def encode_adaptive_mesh(points: Array, faces: Array) -> tuple[bytes, Array, Arr
     Returns:
         The stream, the given point ``(P,)`` of each decoded one, and the decoded triangles.
     """
-    from gvpipe.connectivity.position_kernels import code_positions
+    from gvpipe.connectivity.fitted_kernels import code_fitted
     from gvpipe.entropy.decision_kernels import finish, start_encoder
 
     parts, permutation, coded = encode_triangles(faces.astype(np.int64), len(points))
     state, data = start_encoder(), np.zeros(MAX_BYTES * len(points) + 64, np.uint8)
     moved = np.ascontiguousarray(points[permutation], np.int64)
-    code_positions(*_known(coded, len(points)), state, data, False, moved)
+    code_fitted(*_known(coded, len(points)), state, data, False, moved)
     head = [varint(len(points)), *map(pack_block, parts[:3]), varint(parts[3])]
     return b"".join([*head, data[: finish(state, data)].tobytes()]), permutation, coded
 
 
 def decode_adaptive_mesh(
-    stream: bytes, n_vertices: int = MAX_POINTS, n_triangles: int = 2 * MAX_VERTICES
+    stream: bytes, n_vertices: int = MAX_POINTS, n_triangles: int = 2 * MAX_VERTICES, is_fitted: bool = True
 ) -> tuple[Int64, Array]:
     """Mirror of `encode_adaptive_mesh`: points ``(P, 3)``, at most ``n_vertices``, and triangles, at most ``n_triangles``.
+
+    Without ``is_fitted`` the stream is an older one.
 
     Raises:
         CorruptFile: malformed, or larger.
     """
+    from gvpipe.connectivity.fitted_kernels import code_fitted
     from gvpipe.connectivity.position_kernels import code_positions
     from gvpipe.entropy.decision_kernels import AHEAD, PLACE, start_decoder
 
@@ -67,17 +70,30 @@ def decode_adaptive_mesh(
         raise cursor.corrupt("a triangle names a point that does not exist")
     data = np.frombuffer(bytearray(cursor.rest()), np.uint8)  # kernels want it writable
     state, points = start_decoder(data), np.zeros((n_points, 3), np.int64)
-    fits = code_positions(*_known(faces, n_points), state, data, True, points)
+    if is_fitted:
+        fits = code_fitted(*_known(faces, n_points), state, data, True, points)
+    else:
+        fits = code_positions(*_known_before(faces, n_points), state, data, True, points)
     if not fits or state[PLACE] != len(data) + AHEAD:
         raise cursor.corrupt("its decisions name no positions")
     return points, faces
 
 
-def _known(faces: Array, n_points: int) -> tuple[EntryOrder, Mixing]:
-    """The order of points, and what was learnt of them: nothing."""
-    from gvpipe.connectivity.position_kernels import N_CONTEXTS, N_GROUPS
-    from gvpipe.entropy.number_kernels import new_number_mixing
+def _known(faces: Array, n_points: int) -> tuple[EntryOrder, Int32, Int64, Mixing]:
+    """The order of points, triangles, their opposite corners, and what was learnt of positions: nothing."""
+    from gvpipe.connectivity.fitted_kernels import N_CONTEXTS, N_GROUPS
+    from gvpipe.entropy.forecast_kernels import new_forecast_mixing
     from gvpipe.mesh.entry_kernels import order_by_corners
 
     triangles = np.ascontiguousarray(faces, np.int32)
-    return order_by_corners(triangles, opposite_corners(triangles), n_points), new_number_mixing(N_CONTEXTS, N_GROUPS)
+    opposite = opposite_corners(triangles)
+    order = order_by_corners(triangles, opposite, n_points)
+    return order, triangles, opposite, new_forecast_mixing(N_CONTEXTS, N_GROUPS)
+
+
+def _known_before(faces: Array, n_points: int) -> tuple[EntryOrder, Mixing]:
+    """The same for an older stream."""
+    from gvpipe.connectivity.position_kernels import N_CONTEXTS, N_GROUPS
+    from gvpipe.entropy.number_kernels import new_number_mixing
+
+    return _known(faces, n_points)[0], new_number_mixing(N_CONTEXTS, N_GROUPS)

@@ -42,7 +42,7 @@ def code_positions(order: EntryOrder, mixing: Mixing, state: Int64, data: UInt8,
     match, run = -1, 0
     for i in range(n):
         entry, row = order.order[i], i + MATCHED
-        _predict(order, i, positions, guess, mean)
+        predict_mean(order, i, positions, guess, mean)
         if match < 0:
             run = 0
         last = mix_hash(mix_hash(residuals[row - 1, 0], residuals[row - 1, 1]), residuals[row - 1, 2])
@@ -63,13 +63,13 @@ def code_positions(order: EntryOrder, mixing: Mixing, state: Int64, data: UInt8,
             for k in range(c):
                 size += abs(residuals[row, k])
             contexts[0] = mix_hash(1 + 3 * near + c, 64 + min(order.starts[i + 1] - first, 3))
-            contexts[1] = mix_hash(mix_hash(17 + c, near), _length(size))
-            contexts[2] = mix_hash(mix_hash(2 + c, residuals[row - 1, c]), _length(size))
+            contexts[1] = mix_hash(mix_hash(17 + c, near), bit_length(size))
+            contexts[2] = mix_hash(mix_hash(2 + c, residuals[row - 1, c]), bit_length(size))
             contexts[3] = mix_hash(mix_hash(5 + c, a - guess[c]), b - guess[c])
             contexts[4] = mix_hash(8 + c, guess[c])
             contexts[5] = mix_hash(before, pair)
             apart = mean[c] - guess[c]
-            contexts[6] = mix_hash(mix_hash(14 + c, 2 * _length(abs(apart)) + (1 if apart < 0 else 0)), near >> 2)
+            contexts[6] = mix_hash(mix_hash(14 + c, 2 * bit_length(abs(apart)) + (1 if apart < 0 else 0)), near >> 2)
             expected = residuals[match, c] if match >= 0 and fits else 0
             contexts[7] = mix_hash(mix_hash(11 + c, expected), run if match >= 0 and fits else -1)
             group = 3 * c + (0 if match < 0 or not fits else 1 if run < LONG_RUN else 2)
@@ -92,7 +92,7 @@ def code_positions(order: EntryOrder, mixing: Mixing, state: Int64, data: UInt8,
 
 
 @compiled
-def _predict(order: EntryOrder, i: int, positions: Int64, guess: Int64, mean: Int64) -> None:
+def predict_mean(order: EntryOrder, i: int, positions: Int64, guess: Int64, mean: Int64) -> None:
     """Fill ``guess (3,)``, the prediction of entry i of the order, and ``mean (3,)``, that of its neighbours."""
     begin, end = order.starts[i], order.starts[i + 1]
     for c in range(3):
@@ -127,12 +127,12 @@ def _near(order: EntryOrder, i: int, residuals: Int64, c: int) -> int:
     if n == 0:
         return 31
     mean = 4 * total // n
-    length = _length(mean)
+    length = bit_length(mean)
     return min(2 * length + ((mean >> max(length - 2, 0)) & 1 if length > 1 else 0), 30)
 
 
 @compiled
-def _length(value: int) -> int:
+def bit_length(value: int) -> int:
     """Bits of a number."""
     length = 0
     while value >> length:

@@ -6,8 +6,8 @@ are coded once. The mesh over points, with positions, is that of `base_mesh`; `s
 Mesh stream: [8 bits] flags; [varint] length, mesh of points (codec order); [varint] length, counts; corners (`seams`).
 Order stream: `seams`.
 
-Flag 1: the mesh of points is of `adaptive_mesh`, else of `base_mesh`; an encoder takes it where it is smaller. Flag 2: the
-order is of `adaptive_order`, as older encoders wrote it.
+Flag 4: the mesh of points is of `adaptive_mesh`; 1: an older one of that; neither: of `base_mesh`. An encoder takes 4 where it
+is smaller. Flag 2: the order is of `adaptive_order`, as older encoders wrote it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from gvpipe.runtime.forks import kept
 if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph
 
-ADAPTIVE_MESH, ADAPTIVE_ORDER = 1, 2  # flags
-FEW_POINTS = 1 << 13  # up to which adaptive positions open in no time
+ADAPTIVE_MESH, ADAPTIVE_ORDER, FITTED_MESH = 1, 2, 4  # flags; the first and the last exclude each other
+FEW_POINTS = 1 << 14  # up to which adaptive positions open in 0.2 s, about
 WORTH_WAITING = 0.9  # of the other stream, what theirs must be beyond that
 
 
@@ -101,7 +101,7 @@ def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, i
         mesh, permutation, own = adaptive_mesh.encode_adaptive_mesh(lattice, faces)
         if len(mesh) < (1 if len(lattice) <= FEW_POINTS else WORTH_WAITING) * len(plain):
             points = lattice[permutation].astype(np.int32)
-            return mesh, ADAPTIVE_MESH, permutation, BaseMesh(points, own.astype(np.int32))
+            return mesh, FITTED_MESH, permutation, BaseMesh(points, own.astype(np.int32))
     return plain, 0, order, base
 
 
@@ -114,9 +114,9 @@ def _begin_points(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int) 
     """Decode the points; return these, and a function that decodes the vertices. Both raise `CorruptFile`."""
     cursor = Cursor(mesh, "mesh")
     flags = cursor.take(1)[0]
-    if flags > ADAPTIVE_MESH + ADAPTIVE_ORDER:
+    if flags > FITTED_MESH + ADAPTIVE_ORDER or (flags & ADAPTIVE_MESH and flags & FITTED_MESH):
         raise cursor.corrupt(f"flags {flags} are unknown")
-    points, own = _decode_mesh(cursor.block(), bool(flags & ADAPTIVE_MESH), n_vertices, n_triangles)
+    points, own = _decode_mesh(cursor.block(), flags & (ADAPTIVE_MESH | FITTED_MESH), n_vertices, n_triangles)
     counts, corners = cursor.block(), cursor.rest()
     opened = PointMesh(points.astype(np.int32), smallest_first(own.astype(np.int32)))
     _ = opened.graph  # found now, before two threads ask for it
@@ -131,10 +131,10 @@ def _begin_points(mesh: bytes, order: bytes, n_vertices: int, n_triangles: int) 
     return opened, finish
 
 
-def _decode_mesh(mesh: bytes, adaptive: bool, n_vertices: int, n_triangles: int) -> tuple[Array, Array]:
+def _decode_mesh(mesh: bytes, flag: int, n_vertices: int, n_triangles: int) -> tuple[Array, Array]:
     """Mirror of `_encode_mesh`: points ``(P, 3)`` and triangles over them."""
-    if adaptive:
-        return adaptive_mesh.decode_adaptive_mesh(mesh, n_vertices, n_triangles)
+    if flag:
+        return adaptive_mesh.decode_adaptive_mesh(mesh, n_vertices, n_triangles, flag == FITTED_MESH)
     base = decode_base(mesh, n_vertices, n_triangles)
     return base.points, base.faces
 

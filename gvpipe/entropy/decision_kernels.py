@@ -39,8 +39,8 @@ class Mixing(NamedTuple):
     Args:
         chances: ``(K, S)`` probability of a 1 in each slot of each context, in ``2**-ONE_BITS``.
         seen: ``(K, S)`` how often the slot was used, up to a limit.
-        weights: ``(M, K + 1)`` of the mixers, one chosen per decision; 65536 is one. The last one is a bias'.
-        inputs: ``(K + 1,)`` memory.
+        weights: ``(M, I + 1)`` of the mixers, one chosen per decision; 65536 is one. The last one is a bias'.
+        inputs: ``(I + 1,)`` memory: logits of the K contexts, those of others if there are, and a bias.
         rates: share of an error that a slot takes, by how often it was used, in 1 / 65536.
         squash, stretch: of `gvpipe.entropy.logistic_tables`.
     """
@@ -54,16 +54,20 @@ class Mixing(NamedTuple):
     stretch: Int64
 
 
-def new_mixing(n_contexts: int, n_slots: int, n_mixers: int, limit: int = 250) -> Mixing:
-    """Memory in which nothing is learnt; ``limit`` (1..255): a slot's last uses that count, about."""
-    weights = np.full((n_mixers, n_contexts + 1), 65536 * 4 // (3 * n_contexts), np.int64)
+def new_mixing(n_contexts: int, n_slots: int, n_mixers: int, limit: int = 250, n_others: int = 0) -> Mixing:
+    """Memory in which nothing is learnt, for K contexts and ``n_others`` inputs besides.
+
+    ``limit`` (1..255): a slot's last uses that count, about.
+    """
+    n_inputs = n_contexts + n_others
+    weights = np.full((n_mixers, n_inputs + 1), 65536 * 4 // (3 * n_inputs), np.int64)
     weights[:, -1] = 0
     rates = np.array([2 * 65536 // (2 * n + 3) for n in range(limit + 1)], np.int64)
     return Mixing(
         np.full((n_contexts, n_slots), 1 << (ONE_BITS - 1), np.int64),
         np.zeros((n_contexts, n_slots), np.uint8),
         weights,
-        np.zeros(n_contexts + 1, np.int64),
+        np.zeros(n_inputs + 1, np.int64),
         rates,
         squash_table(),
         stretch_table(),
@@ -161,14 +165,28 @@ def code_decision(mixing: Mixing, slots: Int64, mixer: int, state: Int64, data: 
         decoding: whether ``bit`` is unknown.
         bit: 0 or 1.
     """
+    read_slots(mixing, slots)
+    bit = code_inputs(mixing, mixer, (RATE, RATE_BITS), state, data, decoding, bit)
+    learn_slots(mixing, slots, bit)
+    return bit
+
+
+@compiled
+def read_slots(mixing: Mixing, slots: Int64) -> None:
+    """Set the first K inputs: the logits of the slots' probabilities."""
+    for k in range(len(slots)):
+        mixing.inputs[k] = mixing.stretch[mixing.chances[k, slots[k]] >> (ONE_BITS - 12)]
+
+
+@compiled
+def code_inputs(mixing: Mixing, mixer: int, rate: tuple[int, int], state: Int64, data: UInt8, decoding: bool, bit: int) -> int:
+    """Code or decode a decision by the inputs alone; the mixer learns, by ``rate``: a factor, and bits to shift by."""
     inputs, weights = mixing.inputs, mixing.weights[mixer]
-    n = len(slots)
+    n = len(inputs) - 1
     total = 0
-    for k in range(n):
-        inputs[k] = mixing.stretch[mixing.chances[k, slots[k]] >> (ONE_BITS - 12)]
-        total += inputs[k] * weights[k]
     inputs[n] = 256
-    total += inputs[n] * weights[n]
+    for k in range(n + 1):
+        total += inputs[k] * weights[k]
     logit = min(max(total >> 16, -LIMIT), LIMIT)
     chance = mixing.squash[logit + LIMIT]
     if decoding:
@@ -177,12 +195,17 @@ def code_decision(mixing: Mixing, slots: Int64, mixer: int, state: Int64, data: 
         put(state, data, chance, bit)
     error = ((bit << 16) - bit) - chance
     for k in range(n + 1):
-        weights[k] += (inputs[k] * error * RATE) >> RATE_BITS
-    for k in range(n):
+        weights[k] += (inputs[k] * error * rate[0]) >> rate[1]
+    return bit
+
+
+@compiled
+def learn_slots(mixing: Mixing, slots: Int64, bit: int) -> None:
+    """Move the slots' probabilities towards ``bit``."""
+    for k in range(len(slots)):
         slot = slots[k]
         used = mixing.seen[k, slot]
         missing = (bit << ONE_BITS) - bit - mixing.chances[k, slot]
         mixing.chances[k, slot] += (missing * mixing.rates[used]) >> 16
         if used < len(mixing.rates) - 1:
             mixing.seen[k, slot] += np.uint8(1)
-    return bit

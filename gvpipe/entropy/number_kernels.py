@@ -55,7 +55,7 @@ def code_number(
     length = 0
     while True:
         bit = 1 if magnitude >> length else 0
-        _find_slots(contexts, length, slots)
+        find_slots(contexts, length, slots)
         if not code_decision(mixing, slots, MIXERS * group + min(length, 1), state, data, decoding, bit):
             break
         length += 1
@@ -67,19 +67,20 @@ def code_number(
     for place in range(length - 2, -1, -1):
         bit = (magnitude >> place) & 1
         if length - 2 - place < MODELLED:
-            _find_slots(contexts, (length << 4 | value) + NODES, slots)
+            find_slots(contexts, (length << 4 | value) + NODES, slots)
             bit = code_decision(mixing, slots, MIXERS * group + 2, state, data, decoding, bit)
         else:
             bit = code_plain(state, data, decoding, bit)
         value = value << 1 | bit
     if signed:
-        _find_slots(contexts, SIGN, slots)
+        find_slots(contexts, SIGN, slots)
         if code_decision(mixing, slots, MIXERS * group + 3, state, data, decoding, 1 if number < 0 else 0):
             value = -value
     return value
 
 
 @compiled
-def _find_slots(contexts: Int64, node: int, slots: Int64) -> None:
+def find_slots(contexts: Int64, node: int, slots: Int64) -> None:
+    """Fill ``slots (K,)``: those of the contexts for a decision's place."""
     for k in range(len(contexts)):
         slots[k] = mix_hash(contexts[k], node) >> (32 - SLOT_BITS)

@@ -64,8 +64,10 @@ def test_welded_meshes_choose_what_is_smaller(reorder: bool) -> None:
     assert np.array_equal(decoded.lattice, mesh.lattice)
     assert np.array_equal(decoded.faces, mesh.faces)
     assert np.array_equal(decoded.lattice[decoded.point], points[coded.permutation])
-    with pytest.raises(CorruptFile, match="flags 4 are unknown"):
-        decode_points(b"\x04" + coded.mesh[1:], coded.order)
+    with pytest.raises(CorruptFile, match="flags 8 are unknown"):
+        decode_points(b"\x08" + coded.mesh[1:], coded.order)
+    with pytest.raises(CorruptFile, match="flags 5 are unknown"):
+        decode_points(b"\x05" + coded.mesh[1:], coded.order)
 
 
 def test_prefixes_and_longer_streams_are_refused() -> None:

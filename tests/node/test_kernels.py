@@ -69,7 +69,10 @@ def test_kernels_equal_numba_on_trajectories(name: str, tmp_path: Path) -> None:
 @NODE
 @pytest.mark.parametrize(
     "name",
-    ["mcgv-1-seams", "pca-1-seams", "pdct-1-seams", "mcgv-1-klt", "pca-1-order", "mcgv-1-predicted", "mcgv-1-trellis"],
+    [
+        *("mcgv-1-seams", "mcgv-1-fitted-seams", "pca-1-seams", "pdct-1-seams", "mcgv-1-klt", "pca-1-order"),
+        *("mcgv-1-predicted", "mcgv-1-trellis"),
+    ],
 )
 def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
     """Seams, vertex orders, adaptive positions, clips, a blend's matrix and transforms."""
@@ -83,7 +86,12 @@ def test_kernels_equal_numba_on_meshes(name: str, tmp_path: Path) -> None:
     elif name.endswith(("predicted", "trellis")):
         assert used >= {"code_residuals", "predict_kalman"}
     elif name.startswith("mcgv"):
-        assert used >= {"order_by_corners", "code_positions", "visit_corners", "code_visits"}
+        assert used >= {
+            "order_by_corners",
+            "code_fitted" if "fitted" in name else "code_positions",
+            "visit_corners",
+            "code_visits",
+        }
     elif name.startswith("pca"):
         assert used >= {"decode_ranks", "sort_neighbours", "traverse_visits"}
     else:

@@ -101,6 +101,10 @@ export const CELL_POSES_MOST_FACES = 6;
 export const EDGE_SEAM_KERNELS_CONTEXTS = 0;
 export const EDGE_SEAM_KERNELS_DECODE = 2;
 
+// gvpipe.connectivity.fitted_kernels
+export const FITTED_KERNELS_N_CONTEXTS = 6;
+export const FITTED_KERNELS_N_GROUPS = 3;
+
 // gvpipe.connectivity.order_kernels
 export const ORDER_KERNELS_N_CONTEXTS = 7;
 export const ORDER_KERNELS_N_GROUPS = 3;
@@ -119,6 +123,7 @@ export const VISIT_SYMBOLS_N_SYMBOLS = 19;
 // gvpipe.connectivity.welded_mesh
 export const WELDED_MESH_ADAPTIVE_MESH = 1;
 export const WELDED_MESH_ADAPTIVE_ORDER = 2;
+export const WELDED_MESH_FITTED_MESH = 4;
 
 // gvpipe.container.bare
 export const BARE_MAGIC = [103, 118, 98, 97, 114, 101, 13, 10];
@@ -187,6 +192,9 @@ export const DECISION_KERNELS_ONE_BITS = 22;
 export const DECISION_KERNELS_AHEAD = 3;
 export const DECISION_KERNELS_PLACE = 2;
 export const DECISION_KERNELS_RANGE = 4294967295;
+
+// gvpipe.entropy.forecast_kernels
+export const FORECAST_KERNELS_N_FORECASTS = 2;
 
 // gvpipe.entropy.integers
 export const INTEGERS_MAX_CONTEXTS = 65536;

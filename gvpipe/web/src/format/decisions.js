@@ -8,6 +8,7 @@ import {
   DECISION_KERNELS_ONE_BITS as ONE_BITS,
   DECISION_KERNELS_PLACE as PLACE,
   DECISION_KERNELS_RANGE as RANGE,
+  FORECAST_KERNELS_N_FORECASTS as N_FORECASTS,
   LOGISTIC_TABLES_KNOTS as KNOTS,
   LOGISTIC_TABLES_LIMIT as LIMIT,
   LOGISTIC_TABLES_SPACING as SPACING,
@@ -23,18 +24,20 @@ let tables = null; // made when first needed
  * Memory in which nothing is learnt: the members of Python's `Mixing`.
  *
  * @param {import("../wasm/kernels.js").Kernels} kernels @param {number} nContexts @param {number} nSlots of each @param {number} nMixers
+ * @param {number} nOthers inputs beside those of contexts
  */
-export function newMixing(kernels, nContexts, nSlots, nMixers) {
+export function newMixing(kernels, nContexts, nSlots, nMixers, nOthers = 0) {
   tables ??= makeTables();
   const chances = kernels.array("int64", [nContexts, nSlots]);
   kernels.view(chances).fill(1n << BigInt(ONE_BITS - 1));
-  const own = Math.floor((65536 * 4) / (3 * nContexts));
-  const weights = Int32Array.from({ length: nMixers * (nContexts + 1) }, (_, i) => ((i + 1) % (nContexts + 1) ? own : 0));
+  const nInputs = nContexts + nOthers;
+  const own = Math.floor((65536 * 4) / (3 * nInputs));
+  const weights = Int32Array.from({ length: nMixers * (nInputs + 1) }, (_, i) => ((i + 1) % (nInputs + 1) ? own : 0));
   return [
     chances,
     kernels.array("uint8", [nContexts, nSlots]),
-    kernels.whole(weights, [nMixers, nContexts + 1]),
-    kernels.array("int64", [nContexts + 1]),
+    kernels.whole(weights, [nMixers, nInputs + 1]),
+    kernels.array("int64", [nInputs + 1]),
     ...[tables.rates, tables.squash, tables.stretch].map((table) => kernels.array("int64", [table.length], table)),
   ];
 }
@@ -42,6 +45,11 @@ export function newMixing(kernels, nContexts, nSlots, nMixers) {
 /** The same for numbers (`gvpipe.entropy.number_kernels`). @param {number} nGroups of mixers */
 export function newNumberMixing(kernels, nContexts, nGroups) {
   return newMixing(kernels, nContexts, 2 ** SLOT_BITS, MIXERS * nGroups);
+}
+
+/** The same for numbers with a forecast (`gvpipe.entropy.forecast_kernels`). @param {number} nGroups of mixers */
+export function newForecastMixing(kernels, nContexts, nGroups) {
+  return newMixing(kernels, nContexts, 2 ** SLOT_BITS, MIXERS * nGroups, N_FORECASTS);
 }
 
 /** A decoder at the start of `data`. */

@@ -3,7 +3,11 @@
  * `docs/format.md`, section 5.5.
  */
 
-import { WELDED_MESH_ADAPTIVE_MESH as ADAPTIVE_MESH, WELDED_MESH_ADAPTIVE_ORDER as ADAPTIVE_ORDER } from "../constants.js";
+import {
+  WELDED_MESH_ADAPTIVE_MESH as ADAPTIVE_MESH,
+  WELDED_MESH_ADAPTIVE_ORDER as ADAPTIVE_ORDER,
+  WELDED_MESH_FITTED_MESH as FITTED_MESH,
+} from "../constants.js";
 import { decodeAdaptiveMesh } from "./adaptive_mesh.js";
 import { decodeBase } from "./base_mesh.js";
 import { decodeCopies } from "./seams.js";
@@ -25,9 +29,11 @@ import { smallestFirst } from "./topology_only.js";
 export async function decodePoints(kernels, mesh, order, most) {
   const cursor = new Cursor(mesh, "mesh");
   const flags = cursor.u8();
-  if (flags > ADAPTIVE_MESH + ADAPTIVE_ORDER) throw cursor.corrupt(`flags ${flags} are unknown`);
+  const isBoth = (flags & ADAPTIVE_MESH) > 0 && (flags & FITTED_MESH) > 0;
+  if (flags > FITTED_MESH + ADAPTIVE_ORDER || isBoth) throw cursor.corrupt(`flags ${flags} are unknown`);
   const stream = cursor.take(cursor.varint(cursor.left, "a length"));
-  const base = flags & ADAPTIVE_MESH ? await decodeAdaptiveMesh(kernels, stream, most) : await decodeBase(stream, most);
+  const adaptive = flags & (ADAPTIVE_MESH | FITTED_MESH);
+  const base = adaptive ? await decodeAdaptiveMesh(kernels, stream, most, adaptive === FITTED_MESH) : await decodeBase(stream, most);
   const pointFaces = smallestFirst(base.faces);
   const counts = cursor.take(cursor.varint(cursor.left, "a length"));
   const { faces, point } = decodeCopies(kernels, counts, cursor.rest(), order, pointFaces, base.points.length / 3, Boolean(flags & ADAPTIVE_ORDER));
