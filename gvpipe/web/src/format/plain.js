@@ -12,7 +12,7 @@ const TRACK_BYTES = 8; // checksums of the video's samples and of its descriptio
 
 /**
  * @param {Uint8Array} payload that begins with no magic
- * @returns {Promise<{header: object, sections: Map<string, Uint8Array>}>} `header.container` has the checksum of the video's samples
+ * @returns {Promise<{header: object, sections: Map<string, Uint8Array>}>} `header.container` has the checksums of the video
  * @throws {GeometryVideoError} it is damaged, or of a newer version
  */
 export async function readPlain(payload) {
@@ -34,5 +34,6 @@ export async function readPlain(payload) {
   for (const [name, length] of lengths) sections.set(name, cursor.take(length));
   cursor.end();
   header.container.video_crc32 = view.getUint32(content.length - TRACK_BYTES, true);
+  header.container.track_crc32 = view.getUint32(content.length - TRACK_BYTES / 2, true);
   return { header, sections };
 }
