@@ -196,4 +196,4 @@ def _encode_coefficients(codec: Pca, reduced: Reduced, still: StillPoints, causa
         wanted = np.ascontiguousarray(wanted[:, ::-1])
         given = None if given is None else np.ascontiguousarray(given[:, ::-1])
     penalty, flags = (PENALTY, GRADES) if codec.on_trellis else (None, 0)
-    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given, penalty, flags)[0]
+    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given, penalty, flags=flags)[0]
