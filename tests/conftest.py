@@ -23,7 +23,7 @@ from gvpipe.model.sequence import MeshSequence
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 # settings that cost little, for tests of anything but coding
-FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 3, "gop": 4}
+FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 2, "gop": 4}  # few clusters: the rest takes pictures
 start_process = library_process.start_process
 fork_library_processes()  # USD, Alembic and FBX files then take no start of Python each
 

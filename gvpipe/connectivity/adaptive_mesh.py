@@ -2,7 +2,8 @@
 
 Draco codes connectivity alone (`topology_only`); positions follow, in the order of `gvpipe.mesh.entry_kernels`. Why: objects
 recur, and grids are regular. What followed the last residuals before, and coordinates that were seen before, predict the next
-ones (`fitted_kernels`), where Draco has one table for all. Older streams have no forecast (`position_kernels`).
+ones, where Draco has one table for all. A *fitted* stream has a forecast of each position beside (`fitted_kernels`). It is
+smaller, and takes three times as long as one without (`position_kernels`).
 
 Stream: [varint] P; blocks: Draco's stream, merges, loose triangles; [varint] loose triangles; decisions
 (`gvpipe.entropy.decision_kernels`) to the end.
@@ -29,19 +30,23 @@ MAX_POINTS = 1 << 15  # larger meshes take too long
 MAX_BYTES = 24  # per point, of a stream
 
 
-def encode_adaptive_mesh(points: Array, faces: Array) -> tuple[bytes, Array, Array]:
-    """Code lattice ``points (P, 3)``, 0..2**31 - 1, with triangles ``faces (T, 3)``.
+def encode_adaptive_mesh(points: Array, faces: Array, is_fitted: bool = True) -> tuple[bytes, Array, Array]:
+    """Code lattice ``points (P, 3)``, 0..2**31 - 1, with triangles ``faces (T, 3)``; ``is_fitted``: with a forecast.
 
     Returns:
         The stream, the given point ``(P,)`` of each decoded one, and the decoded triangles.
     """
     from gvpipe.connectivity.fitted_kernels import code_fitted
+    from gvpipe.connectivity.position_kernels import code_positions
     from gvpipe.entropy.decision_kernels import finish, start_encoder
 
     parts, permutation, coded = encode_triangles(faces.astype(np.int64), len(points))
     state, data = start_encoder(), np.zeros(MAX_BYTES * len(points) + 64, np.uint8)
     moved = np.ascontiguousarray(points[permutation], np.int64)
-    code_fitted(*_known(coded, len(points)), state, data, False, moved)
+    if is_fitted:
+        code_fitted(*_known(coded, len(points)), state, data, False, moved)
+    else:
+        code_positions(*_known_unfitted(coded, len(points)), state, data, False, moved)
     head = [varint(len(points)), *map(pack_block, parts[:3]), varint(parts[3])]
     return b"".join([*head, data[: finish(state, data)].tobytes()]), permutation, coded
 
@@ -50,8 +55,6 @@ def decode_adaptive_mesh(
     stream: bytes, n_vertices: int = MAX_POINTS, n_triangles: int = 2 * MAX_VERTICES, is_fitted: bool = True
 ) -> tuple[Int64, Array]:
     """Mirror of `encode_adaptive_mesh`: points ``(P, 3)``, at most ``n_vertices``, and triangles, at most ``n_triangles``.
-
-    Without ``is_fitted`` the stream is an older one.
 
     Raises:
         CorruptFile: malformed, or larger.
@@ -73,7 +76,7 @@ def decode_adaptive_mesh(
     if is_fitted:
         fits = code_fitted(*_known(faces, n_points), state, data, True, points)
     else:
-        fits = code_positions(*_known_before(faces, n_points), state, data, True, points)
+        fits = code_positions(*_known_unfitted(faces, n_points), state, data, True, points)
     if not fits or state[PLACE] != len(data) + AHEAD:
         raise cursor.corrupt("its decisions name no positions")
     return points, faces
@@ -91,8 +94,8 @@ def _known(faces: Array, n_points: int) -> tuple[EntryOrder, Int32, Int64, Mixin
     return order, triangles, opposite, new_forecast_mixing(N_CONTEXTS, N_GROUPS)
 
 
-def _known_before(faces: Array, n_points: int) -> tuple[EntryOrder, Mixing]:
-    """The same for an older stream."""
+def _known_unfitted(faces: Array, n_points: int) -> tuple[EntryOrder, Mixing]:
+    """The same without a forecast."""
     from gvpipe.connectivity.position_kernels import N_CONTEXTS, N_GROUPS
     from gvpipe.entropy.number_kernels import new_number_mixing
 

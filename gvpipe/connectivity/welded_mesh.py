@@ -6,8 +6,8 @@ are coded once. The mesh over points, with positions, is that of `base_mesh`; `s
 Mesh stream: [8 bits] flags; [varint] length, mesh of points (codec order); [varint] length, counts; corners (`seams`).
 Order stream: `seams`.
 
-Flag 4: the mesh of points is of `adaptive_mesh`; 1: an older one of that; neither: of `base_mesh`. An encoder takes 4 where it
-is smaller. Flag 2: the order is of `adaptive_order`, as older encoders wrote it.
+Flag 1: the mesh of points is of `adaptive_mesh`; 4: of that, and fitted; neither: of `base_mesh`. An encoder takes the smallest
+that is worth its time. Flag 2: the order is of `adaptive_order`, as older encoders wrote it.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from gvpipe.mesh.graph_kernels import Graph
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER, FITTED_MESH = 1, 2, 4  # flags; the first and the last exclude each other
-FEW_POINTS = 1 << 14  # up to which adaptive positions open in 0.2 s, about
-WORTH_WAITING = 0.9  # of the other stream, what theirs must be beyond that
+FEW_POINTS, FEW_FITTED = 1 << 13, 1 << 11  # up to which adaptive positions, and fitted ones, open in no time
+WORTH_WAITING = 0.9  # of what takes less time, what theirs must be beyond that
 
 
 @dataclass(frozen=True)
@@ -95,14 +95,16 @@ def encode_points(
 
 
 def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, int, Array, BaseMesh]:
-    """The smaller mesh stream of points, its flag, the given point of each decoded one, and what a decoder has."""
-    plain, order, base = encode_base(lattice, faces)
+    """The mesh stream of points that is worth its time, its flag, the given point of each decoded one, what a decoder has."""
+    mesh, order, base = encode_base(lattice, faces)
+    flag = 0
     if adaptive and len(lattice) <= adaptive_mesh.MAX_POINTS:
-        mesh, permutation, own = adaptive_mesh.encode_adaptive_mesh(lattice, faces)
-        if len(mesh) < (1 if len(lattice) <= FEW_POINTS else WORTH_WAITING) * len(plain):
-            points = lattice[permutation].astype(np.int32)
-            return mesh, FITTED_MESH, permutation, BaseMesh(points, own.astype(np.int32))
-    return plain, 0, order, base
+        for own_flag, few in ((ADAPTIVE_MESH, FEW_POINTS), (FITTED_MESH, FEW_FITTED)):
+            own, permutation, triangles = adaptive_mesh.encode_adaptive_mesh(lattice, faces, own_flag == FITTED_MESH)
+            if len(own) < (1 if len(lattice) <= few else WORTH_WAITING) * len(mesh):
+                mesh, flag, order = own, own_flag, permutation
+                base = BaseMesh(lattice[order].astype(np.int32), triangles.astype(np.int32))
+    return mesh, flag, order, base
 
 
 def decode_points(mesh: bytes, order: bytes, n_vertices: int = MAX_VERTICES, n_triangles: int = 2 * MAX_VERTICES) -> WeldedMesh:

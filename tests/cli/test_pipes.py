@@ -17,7 +17,7 @@ from gvpipe.cli import main
 from gvpipe.model.sequence import MeshSequence
 
 Piped = Callable[..., tuple[int, bytes, str]]
-OPTIONS = ("--set", "preset=ultrafast", "--set", "clusters=3", "--set", "gop=4")
+OPTIONS = ("--set", "preset=ultrafast", "--set", "clusters=2", "--set", "gop=4")
 
 
 def gvpipe_process(*arguments: object, given: bytes = b"") -> tuple[int, bytes, str]:

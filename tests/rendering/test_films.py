@@ -81,7 +81,7 @@ def test_awkward_inputs_are_painted_or_refused(name: str, tmp_path: Path) -> Non
         assert picture.shape == (64, 64, 3)
         assert (picture[0] == EMPTY).all() and (picture[:, 0] == EMPTY).all()  # the margin is free
         assert (picture != EMPTY).any() == (name != "all at one point")
-    assert paint(sequence.read(0, 1)[0], sequence.faces).shape == (128, 128)
+    assert paint(sequence.read(0, 1)[0], sequence.faces).shape == (96, 96)
 
 
 def test_same_input_same_bytes(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ from gvpipe.rate_control.trials import Trial, Trials
 from gvpipe.web.export import MOST_ENCODES
 
 WEB = Path(gvpipe.__file__).parent / "web"
-PLAYER_BYTES = 0.7e6  # what a page may hold beside 1.35 times its file
+PLAYER_BYTES = 0.73e6  # what a page may hold beside 1.35 times its file
 
 Run = Callable[..., Finished]
 
