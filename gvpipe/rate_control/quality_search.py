@@ -59,7 +59,6 @@ class Closeness(NamedTuple):
 
 
 DEAR = Closeness(TOLERANCE, 1)
-QUICK = Closeness(CLOSE, 2)  # of large ones, by codecs that take a tenth of the time of others
 SMALL = Closeness(CLOSE, 4)  # of small sequences
 CHEAP = Closeness(CLOSE, 5)  # where further encodes take a tenth of the first
 

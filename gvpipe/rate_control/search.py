@@ -11,7 +11,7 @@ from gvpipe.coding.quality_scale import quality_of
 from gvpipe.foundation.progress import Progress
 from gvpipe.metrics.vertex_errors import frame_diagonal, measure_spread
 from gvpipe.model.sequence import MeshSequence
-from gvpipe.rate_control.quality_search import CHEAP, DEAR, QUICK, SMALL, TOLERANCE, find_quality
+from gvpipe.rate_control.quality_search import CHEAP, DEAR, SMALL, TOLERANCE, find_quality
 from gvpipe.rate_control.size_estimates import at_error
 from gvpipe.rate_control.smallest_search import find_smallest
 from gvpipe.rate_control.targets import NAMES, Target
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
 
 SMALL_SEQUENCE = 250_000  # positions: any encode takes little
-LITTLE_EFFORT = 0.1  # of a codec, where a second encode is worth it
 
 
 class TooLarge(Exception):
@@ -73,8 +72,7 @@ def meet(
     trials = Trials(codec, sequence, target.largest, progress, asset, is_bare)
     attempt = trials if target.measure == "bpvf" else _GivingUp(trials, target, most)
     is_small = sequence.n_frames * sequence.n_vertices <= SMALL_SEQUENCE
-    others = QUICK if codec.effort <= LITTLE_EFFORT else DEAR
-    closeness = CHEAP if codec.is_cheap_again else SMALL if is_small else others
+    closeness = CHEAP if codec.is_cheap_again else SMALL if is_small else DEAR
     trial, tried = find_quality(attempt, target, _start(target, codec, sequence), closeness)
     found = target.of(trial)
     reason = f"quality {trial.codec.quality:.4g} gives {NAMES[target.measure]} {found:.4g} where {target.value:g} is allowed"
