@@ -37,12 +37,12 @@ only_x86_64 = pytest.mark.skipif(
 )
 
 
-def lines_as(machine: dict[str, str], script: str, *arguments: object) -> list[str]:
+def lines_as(machine: dict[str, str], script: str, *arguments: object, python: str = sys.executable) -> list[str]:
     """What a script prints in a process with these environment variables; kernels that it compiles anew are kept."""
     if "NUMBA_CPU_NAME" in machine:  # from run to run, apart from this machine's code
         machine = {**machine, "NUMBA_CACHE_DIR": str(ROOT / "build" / "same_bits")}
     environment = {**os.environ, **machine}
-    command = [sys.executable, "-W", "ignore", "-c", script, *map(str, arguments)]
+    command = [python, "-W", "ignore", "-c", script, *map(str, arguments)]
     done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
