@@ -3,11 +3,11 @@
     python tools/compare_machines.py                            # the repository's own samples
     python tools/compare_machines.py --data FOLDER              # and every .npz file of a folder
     python tools/compare_machines.py --data FOLDER --codec pca --sequence cow --machine old --machine Haswell
-    python tools/compare_machines.py --sequence robot --python ./arm-python     # beside this one, a Python for ARM in an emulator
+    python tools/compare_machines.py --sequence robot --python ./arm-python     # a Python for ARM in an emulator
 
 Each codec codes each sequence with ``--target-kg 0.1``: here, and in processes whose libraries believe that the processor
 has fewer instructions (`tests/machines.py`). ``old`` is all of that at once but for kernels, which ``generic`` compiles anew:
-that takes minutes. ``--python`` names a program that runs as Python does, and has gvpipe with the same versions of its libraries.
+that takes minutes. ``--python`` names a program that runs as Python does, with the same versions of gvpipe and its libraries.
 """
 
 from __future__ import annotations
