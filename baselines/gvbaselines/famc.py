@@ -41,7 +41,7 @@ from gvpipe.container.json_object import JsonObject
 from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Float64
 from gvpipe.mesh.hierarchy import build_hierarchy
-from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder, independent_order
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 
@@ -79,7 +79,7 @@ class Famc(Baseline):
         local = local_coordinates(base, places, labels)
         fitted = [fit_motion(shifts[labels == k], local[labels == k]) for k in range(len(places.centres))]
         series = _to_frequencies(np.concatenate(fitted))  # (4K, 3n)
-        coded_motions, decoded = encode_vectors(series, motion_step, _by_themselves(len(series)), PREDICTOR)
+        coded_motions, decoded = encode_vectors(series, motion_step, independent_order(len(series)), PREDICTOR)
         motions = _motions(decoded)
         beside = find_candidates(mesh, labels)
         weights = find_weights(shifts, base, labels, motions, places, beside)
@@ -115,7 +115,7 @@ class Famc(Baseline):
             raise cursor.corrupt("a weight is out of range")
         coded_motions, coded_left = cursor.block(), cursor.block()
         cursor.end()
-        alone = _by_themselves(4 * n_clusters)
+        alone = independent_order(4 * n_clusters)
         motions = _motions(decode_vectors(coded_motions, 3 * n_frames, motion_step, alone, cursor.name, predictor=PREDICTOR))
         left = decode_vectors(coded_left, 3 * n_frames, step, _layers(mesh), cursor.name, predictor=PREDICTOR)
         shifts = _from_frequencies(left) + blend(base, labels, motions, place(base, labels), beside, weights)
@@ -125,21 +125,6 @@ class Famc(Baseline):
 def _layers(mesh: Topology) -> CausalOrder:
     """The points from coarse layers to fine ones."""
     return hierarchy_order(build_hierarchy(mesh.point_faces, mesh.n_points), overshoots=False)
-
-
-def _by_themselves(n: int) -> CausalOrder:
-    """The order of n vectors without neighbours."""
-    ends, none = np.array([0, n], np.int32), np.zeros(0)
-    return CausalOrder(
-        np.arange(n, dtype=np.int32),
-        np.zeros(n + 1, np.int32),
-        none.astype(np.int32),
-        none,
-        none,
-        np.zeros(n, np.int32),
-        ends,
-        False,
-    )
 
 
 def _motions(series: Float64) -> Float64:

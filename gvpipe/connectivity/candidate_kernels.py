@@ -1,9 +1,9 @@
 """Kernel of `gvpipe.connectivity.candidate_order`: which of a few candidates each vertex is, coded.
 
-*Candidates* for the next vertex are vertices not visited that are neighbours of one of the last three, or of a vertex visited
-just before or after a neighbour of these. So rows of a grid, rings of a tube and corners of a triangle have their successor
-among them. The *relations* of a candidate are bits, one for each way in which it was found. Candidates are tried in the order
-of how often their relations were right, each by one decision. The contexts of a decision:
+*Candidates* for the next vertex are not visited yet. Each is a neighbour of one of the last three vertices, or of a vertex
+visited just before or after one of their neighbours. So rows of a grid, rings of a tube and corners of a triangle have their
+successor among them. The *relations* of a candidate are bits, one for each way in which it was found. Candidates are tried in
+the order of how often their relations were right, each by one decision. The contexts of a decision:
 
 0. the relations;
 1. these, how many candidates before have them, too (the *kind*), and the last kind that was right;

@@ -1,8 +1,8 @@
 """Kernels: where the angles around known vertices put the third corner of the next triangle.
 
-All triangles are known before any position. Around vertices a and b of an edge, known angles and the number of corners that are
-left tell the angle that each of these has, on average. With the angles at a and b, a triangle a b x has its shape, where the
-parallelogram takes that of the triangle a b o across the edge. The idea: L. Vasa and G. Brunnett, "Exploiting Connectivity to
+All triangles are known before any position. So the angles left around a vertex, divided by its corners left, predict each of
+these. The angles at a and b give triangle a b x its shape. The parallelogram takes the shape of the triangle across the edge
+instead. The idea: L. Vasa and G. Brunnett, "Exploiting Connectivity to
 Improve the Tangential Part of Geometry Prediction", 2013. Here it gives shifts of the parallelogram, along the edge and across.
 
 Angles are in half turns. Sines and cosines are Bhaskara's rational ones, within 0.002, which are the same on any machine.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from gvpipe.foundation.arrays import Float64, Int32
 
 
@@ -28,3 +30,18 @@ class CausalOrder(NamedTuple):
     ring_sizes: Int32
     blocks: Int32
     affine: bool
+
+
+def independent_order(n: int) -> CausalOrder:
+    """The order of n vectors by number, in one block, none predicted from another."""
+    nothing = np.zeros(0)
+    return CausalOrder(
+        order=np.arange(n, dtype=np.int32),
+        starts=np.zeros(n + 1, np.int32),
+        neighbours=nothing.astype(np.int32),
+        weights=nothing,
+        variances=nothing,
+        ring_sizes=np.zeros(n, np.int32),
+        blocks=np.array([0, n], np.int32),
+        affine=False,
+    )

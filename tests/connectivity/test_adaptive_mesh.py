@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sequences import grid
 
+from gvpipe.connectivity import welded_mesh
 from gvpipe.connectivity.adaptive_mesh import decode_adaptive_mesh, encode_adaptive_mesh
 from gvpipe.connectivity.adaptive_order import decode_adaptive_order
 from gvpipe.connectivity.candidate_order import decode_candidate_order, encode_candidate_order
-from gvpipe.connectivity.welded_mesh import decode_points, encode_points
+from gvpipe.connectivity.welded_mesh import ADAPTIVE_MESH, FITTED_MESH, decode_points, encode_points
 from gvpipe.foundation.errors import CorruptFile
 
 FLAT = np.array([[0, 1, 2], [0, 0, 1], [1, 1, 1], [0, 1, 2]])  # doubled and collapsed triangles
@@ -34,10 +35,11 @@ def sheets(count: int, side: int = 7) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(
     "mesh", [sheets(1), sheets(9), (np.arange(12).reshape(4, 3), FLAT), (np.ones((3, 3), np.int64), FLAT[:0])]
 )
-def test_meshes_come_back(mesh: tuple[np.ndarray, np.ndarray]) -> None:
+@pytest.mark.parametrize("is_fitted", [False, True])
+def test_meshes_come_back(mesh: tuple[np.ndarray, np.ndarray], is_fitted: bool) -> None:
     points, faces = mesh
-    stream, permutation, own = encode_adaptive_mesh(points, faces)
-    decoded, triangles = decode_adaptive_mesh(stream)
+    stream, permutation, own = encode_adaptive_mesh(points, faces, is_fitted)
+    decoded, triangles = decode_adaptive_mesh(stream, is_fitted=is_fitted)
     assert np.array_equal(decoded, points[permutation])
     assert np.array_equal(triangles, own)
     assert sorted(map(sorted, permutation[triangles].tolist())) == sorted(map(sorted, faces.tolist()))
@@ -70,13 +72,23 @@ def test_welded_meshes_choose_what_is_smaller(reorder: bool) -> None:
         decode_points(b"\x05" + coded.mesh[1:], coded.order)
 
 
-def test_prefixes_and_longer_streams_are_refused() -> None:
+def test_a_forecast_is_taken_where_it_is_worth_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, faces = sheets(4, 12)
+    sizes = [len(encode_adaptive_mesh(points, faces, is_fitted)[0]) for is_fitted in (False, True)]
+    assert 0.9 * sizes[0] < sizes[1] < sizes[0]  # less than a tenth
+    for few, flag in ((1000, FITTED_MESH), (0, ADAPTIVE_MESH)):
+        monkeypatch.setattr(welded_mesh, "FEW_FITTED", few)
+        assert encode_points(points, faces, np.arange(len(points)), reorder=True)[0].mesh[0] == flag
+
+
+@pytest.mark.parametrize("is_fitted", [False, True])
+def test_prefixes_and_longer_streams_are_refused(is_fitted: bool) -> None:
     points, faces = sheets(2, 5)
-    stream = encode_adaptive_mesh(points, faces)[0]
+    stream = encode_adaptive_mesh(points, faces, is_fitted)[0]
     order = encode_candidate_order(np.random.default_rng(0).permutation(50), np.arange(50), faces)
     for wrong in [*(stream[:end] for end in range(len(stream))), stream + b"\0"]:
         with pytest.raises(CorruptFile):
-            decode_adaptive_mesh(wrong)
+            decode_adaptive_mesh(wrong, is_fitted=is_fitted)
     for wrong in (order[:1], order[:-2], order + b"\0"):
         with pytest.raises(CorruptFile):
             decode_candidate_order(wrong, np.arange(50), faces)

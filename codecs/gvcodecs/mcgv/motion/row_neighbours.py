@@ -11,7 +11,7 @@ import numpy as np
 
 from gvcodecs.mcgv.motion.skinning import Weights
 from gvpipe.foundation.arrays import Int64
-from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.causal_order import CausalOrder, independent_order
 
 MOST = 8  # clusters; twelve are no better
 VARIANCE = 0.003  # prior variance of a weight
@@ -27,16 +27,11 @@ def row_order(weights: Weights, n_clusters: int) -> CausalOrder:
         for i in range(4):
             neighbours += [*(4 * near + i).tolist(), *range(4 * k, 4 * k + i)]
             starts.append(len(neighbours))
-    n = 4 * n_clusters
-    return CausalOrder(
-        order=np.arange(n, dtype=np.int32),
+    return independent_order(4 * n_clusters)._replace(
         starts=np.array(starts, np.int32),
         neighbours=np.array(neighbours, np.int32),
         weights=np.zeros(len(neighbours)),
         variances=np.full(len(neighbours), VARIANCE),
-        ring_sizes=np.zeros(n, np.int32),
-        blocks=np.array([0, n], np.int32),
-        affine=False,
     )
 
 

@@ -34,7 +34,7 @@ from gvpipe.trajectory.basis import (
     find_principal,
     fit_coefficients,
 )
-from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.causal_order import independent_order
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 from gvpipe.trajectory.trellis_search import BASIS_PENALTY, PENALTY
 
@@ -79,7 +79,7 @@ def encode_trajectories(
     principal = find_principal(weighted, rows.size * step * step / 12, is_centred=False)
     n_components = count_components(principal, len(rows), step)
     head, basis = encode_basis(principal, n_components, len(rows), step, penalty=BASIS_PENALTY)
-    wanted, orders = fit_coefficients(rows, basis), [(b"", _unpredicted(len(rows)))]
+    wanted, orders = fit_coefficients(rows, basis), [(b"", independent_order(len(rows)))]
     if weights:
         orders.append((varint(PREDICTED), row_order(weights, len(rows) // 4)))
     sections = []
@@ -98,31 +98,16 @@ def decode_trajectories(
     is_predicted = length == PREDICTED
     head = cursor.take(cursor.varint(cursor.left, "a length") if is_predicted else length)
     basis = decode_basis(head, n_frames, 4 * n_clusters, step, name, budget=budget)
-    order = row_order(weights, n_clusters) if is_predicted else _unpredicted(4 * n_clusters)
+    order = row_order(weights, n_clusters) if is_predicted else independent_order(4 * n_clusters)
     coefficients = decode_vectors(cursor.rest(), basis.vectors.shape[1], step, order, name)
     return Trajectories(basis, coefficients)
 
 
 def encode_coefficients(coefficients: Float64, step: float) -> tuple[bytes, Float64]:
     """Code the transforms' ``coefficients (4K, R)`` by plain rounding; return the bytes and what the decoder will have."""
-    return encode_vectors(coefficients, step, _unpredicted(len(coefficients)))
+    return encode_vectors(coefficients, step, independent_order(len(coefficients)))
 
 
 def decode_coefficients(data: bytes, n_clusters: int, n_components: int, step: float, name: str) -> Float64:
     """Mirror of `encode_coefficients`; raises `CorruptFile` if the bytes are not what it writes."""
-    return decode_vectors(data, n_components, step, _unpredicted(4 * n_clusters), name)
-
-
-def _unpredicted(n_vectors: int) -> CausalOrder:
-    """Vectors in their own order, each predicted as zero: contexts follow from the vector's earlier components."""
-    nothing = np.zeros(0)
-    return CausalOrder(
-        order=np.arange(n_vectors, dtype=np.int32),
-        starts=np.zeros(n_vectors + 1, np.int32),
-        neighbours=nothing.astype(np.int32),
-        weights=nothing,
-        variances=nothing,
-        ring_sizes=np.zeros(n_vectors, np.int32),
-        blocks=np.array([0, n_vectors], np.int32),
-        affine=False,
-    )
+    return decode_vectors(data, n_components, step, independent_order(4 * n_clusters), name)

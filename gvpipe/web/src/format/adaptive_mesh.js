@@ -18,7 +18,7 @@ import { decodeTriangles } from "./topology_only.js";
 
 /**
  * @param {import("../wasm/kernels.js").Kernels} kernels @param {Uint8Array} stream
- * @param {{vertices: number, triangles: number}} most of the header @param {boolean} isFitted false: an older stream
+ * @param {{vertices: number, triangles: number}} most of the header @param {boolean} isFitted false: contexts alone
  * @returns {Promise<{points: Int32Array, faces: Uint32Array}>} (P, 3) lattice units, and (T, 3) triangles over them, flat
  */
 export async function decodeAdaptiveMesh(kernels, stream, most, isFitted) {
