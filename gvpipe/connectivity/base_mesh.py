@@ -97,11 +97,11 @@ def decode_base(mesh: bytes, n_vertices: int = MAX_VERTICES, n_triangles: int = 
     return BaseMesh(points.astype(np.int32), faces.astype(np.int32))
 
 
-def keep_mesh(budget: Budget, n_vertices: int, n_triangles: int) -> None:
-    """Check that a file may take the memory and work of a mesh of its size; raises `OverBudget`."""
+def keep_mesh(budget: Budget, n_vertices: int, n_triangles: int, more_seconds: float = 0.0) -> None:
+    """Check that a file may take the memory and work of a mesh of its size, and more of work; raises `OverBudget`."""
     what = f"a mesh of {n_vertices} vertices and {n_triangles} triangles"
     budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles)
-    seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
+    seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles + more_seconds
     budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
 
 

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 MARK = 255  # first byte
 MAX_VERTICES = 1 << 16  # larger meshes take too long
 MAX_BYTES = 160  # per vertex, of a stream: two for each decision, at most
+SECONDS_PER_VERTEX = 11e-6  # of hostile streams
+
+
+def seconds_of(order: bytes, n_vertices: int) -> float:
+    """What decoding section ``order`` takes beyond the mesh, seconds, at most."""
+    return SECONDS_PER_VERTEX * n_vertices if order[:1] == bytes([MARK]) else 0.0
 
 
 def encode_candidate_order(visits: Array, points: Array, faces: Array) -> bytes:

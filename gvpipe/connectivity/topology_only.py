@@ -35,6 +35,7 @@ from gvpipe.connectivity.base_mesh import (
     keep_mesh,
     may_run_beside,
 )
+from gvpipe.connectivity.candidate_order import seconds_of
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
@@ -144,8 +145,9 @@ def open_mesh(bitstream: Bitstream) -> Iterator[tuple[PointTriangles, Callable[[
     says.
     """
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
-    keep_mesh(bitstream.budget, n_vertices, n_triangles)
-    opened, finish = _begin_mesh(bitstream.section("mesh"), bitstream.section("order"), n_vertices, n_triangles)
+    order = bitstream.section("order")
+    keep_mesh(bitstream.budget, n_vertices, n_triangles, seconds_of(order, n_vertices))
+    opened, finish = _begin_mesh(bitstream.section("mesh"), order, n_vertices, n_triangles)
     bitstream.check_size(n_vertices, len(opened.point_faces))
 
     def checked() -> Topology:

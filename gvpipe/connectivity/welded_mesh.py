@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvpipe.connectivity import adaptive_mesh
+from gvpipe.connectivity import adaptive_mesh, candidate_order
 from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh, may_run_beside
 from gvpipe.connectivity.seams import decode_seams, encode_seams
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 ADAPTIVE_MESH, ADAPTIVE_ORDER, FITTED_MESH = 1, 2, 4  # flags; the first and the last exclude each other
 FEW_POINTS, FEW_FITTED = 1 << 13, 1 << 11  # up to which adaptive positions, and fitted ones, open in no time
+SECONDS_PER_FITTED = 32e-6  # of hostile streams
 WORTH_WAITING = 0.9  # of what takes less time, what theirs must be beyond that
 
 
@@ -160,9 +161,11 @@ def read_points(bitstream: Bitstream) -> WeldedMesh:
 def _begin_reading(bitstream: Bitstream) -> tuple[PointMesh, Callable[[], WeldedMesh]]:
     """As `_begin_points`, of a file; sizes are checked."""
     n_vertices, n_triangles = bitstream.n_vertices, bitstream.n_triangles
-    keep_mesh(bitstream.budget, n_vertices, n_triangles)
-    sections = bitstream.section("mesh"), bitstream.section("order")
-    points, finish = _begin_points(*sections, n_vertices, n_triangles)
+    mesh, order = bitstream.section("mesh"), bitstream.section("order")
+    fitted = min(n_vertices, adaptive_mesh.MAX_POINTS) if mesh and mesh[0] & FITTED_MESH else 0
+    more = SECONDS_PER_FITTED * fitted + candidate_order.seconds_of(order, n_vertices)
+    keep_mesh(bitstream.budget, n_vertices, n_triangles, more)
+    points, finish = _begin_points(mesh, order, n_vertices, n_triangles)
     bitstream.check_size(n_vertices, len(points.point_faces))
 
     def checked() -> WeldedMesh:

@@ -16,7 +16,7 @@ import zlib
 from collections.abc import Mapping
 from typing import Any
 
-from gvpipe.container.bitstream import HEADER, MAX_HEADER, MAX_SECTIONS, NAME, Bitstream, header_values
+from gvpipe.container.bitstream import HEADER, MAX_HEADER, MAX_NAME, MAX_SECTIONS, NAME, Bitstream, header_values
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject, unpack_json
 from gvpipe.foundation.budget import Budget
@@ -50,6 +50,12 @@ def section_lengths(header: JsonObject) -> dict[str, int]:
     """Bytes of each section, in order; raises `CorruptFile`."""
     found = header.object(SECTIONS)
     names = list(found.plain)
-    if len(names) > MAX_SECTIONS or not all(name.isascii() and NAME.fullmatch(name.encode()) for name in names):
-        raise found.corrupt("the names of its sections are not of a to z, 0 to 9 and dots")
+    if len(names) > MAX_SECTIONS or not all(map(_is_name, names)):
+        raise found.corrupt("the names of its sections are not a letter and up to 63 of a to z, 0 to 9 and dots")
     return {name: found.integer(name, 0, MAX_LENGTH) for name in names}
+
+
+def _is_name(name: str) -> bool:
+    """Whether a section may have the name; it begins with a letter, since JavaScript puts numbers before other keys."""
+    fits = name.isascii() and len(name) <= MAX_NAME and NAME.fullmatch(name.encode()) is not None
+    return fits and name[0].isalpha() and name != HEADER

@@ -2,7 +2,7 @@
 
 Why: `gvpipe.entropy.block_coder` asks for a few values at a time, whose contexts depend on those before. A call of a library
 for each of these costs far more than what it decodes: samba's blended motion opens four times as fast with these loops.
-The words are those of the library constriction, `RangeEncoder` and `RangeDecoder`, which the tests compare with.
+The words are those of the library constriction, but for a last word of 0 that it adds at times; the tests read its words.
 
 A state is ``(3,) uint64``: point minus lower end, range, and the place of the next word.
 

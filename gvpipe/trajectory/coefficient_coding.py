@@ -135,6 +135,8 @@ def decode_vectors(
         raise cursor.corrupt("a magnitude level is out of range")
     rest = cursor.rest()
     flags = _flags(rest)
+    if flags and predictor != "kalman":
+        raise cursor.corrupt("its flags are those of the predictor kalman")
     coder = BlockDecoder(rest, N_CONTEXTS, name) if flags is None else TrellisDecoder(rest[1:], name)
     steps = block_steps(step if flags is None else step * FINENESS, len(causal.blocks) - 1, flags or 0).tolist()
     wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks

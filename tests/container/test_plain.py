@@ -77,7 +77,11 @@ def test_versions() -> None:
 
 
 @pytest.mark.parametrize(
-    "sections", [None, [], {"mesh": -1}, {"mesh": 1 << 41}, {"mesh": 4}, {"mesh": 6}, {"Mesh": 5}, {"mesh": 5.5}]
+    "sections",
+    [
+        *(None, [], {"mesh": -1}, {"mesh": 1 << 41}, {"mesh": 4}, {"mesh": 6}, {"mesh": 5.5}),
+        *({"Mesh": 5}, {"1": 5}, {"header": 5}, {65 * "a": 5}, {"": 5}),
+    ],
 )
 def test_hostile_lengths_behind_right_checksums(sections: object) -> None:
     values = {**compact_values(dataclasses.replace(small_stream(), sections={}), {}), "sections": sections}

@@ -59,6 +59,8 @@ def test_flags_of_a_stream(flags: int) -> None:
     causal = temporal_order(400, finds_noises=bool(flags & FINDS_NOISES))
     data, decoded = encode_vectors(target, 0.1, causal, penalty=0.2, flags=flags)
     assert stream_flags(data, "x") == flags
+    with pytest.raises(CorruptFile, match="flags are those of the predictor kalman"):
+        decode_vectors(data, target.shape[1], 0.1, causal, "x", predictor="navg")
     assert np.allclose(decode_vectors(data, 9, 0.1, causal, "x"), decoded, rtol=0, atol=1e-7)
     part = decode_vectors(data, 9, 0.1, causal, "x", n_blocks=3)
     early, late = causal.order[: causal.blocks[3]], causal.order[causal.blocks[-2] :]

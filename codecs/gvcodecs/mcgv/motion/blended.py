@@ -227,7 +227,8 @@ def decode_transforms(bitstream: Bitstream, header: Header, blend: Blend, s: int
     """The transforms of segment s; raises `CorruptFile`."""
     name, bounds = f"transforms.{s}", segment_starts(bitstream.n_frames, header.segments)
     section, n_frames, step = bitstream.section(name), bounds[s + 1] - bounds[s], header.transform_step
-    return decode_trajectories(section, blend.weights, blend.n_clusters, n_frames, step, name, budget=bitstream.budget)
+    find_order, budget = lambda: blend.row_order, bitstream.budget
+    return decode_trajectories(section, find_order, blend.n_clusters, n_frames, step, name, budget=budget)
 
 
 def _columns(frames: Float64) -> Float64:

@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from gvcodecs.mcgv.motion.skinning import Weights
-from gvpipe.foundation.arrays import Int64
+from gvpipe.foundation.arrays import Int32, Int64
 from gvpipe.trajectory.causal_order import CausalOrder, independent_order
 
 MOST = 8  # clusters; twelve are no better
 VARIANCE = 0.003  # prior variance of a weight
 
 
-def row_order(weights: Weights, n_clusters: int) -> CausalOrder:
-    """The causal order of the rows ``4 k + i`` of all clusters, by number, in one block."""
-    shared, neighbours, starts = count_shared(weights, n_clusters), list[int](), [0]
+def row_order(clusters: Int32, weights: Int32, n_clusters: int) -> CausalOrder:
+    """The causal order of the rows ``4 k + i`` of all clusters, by number, in one block.
+
+    ``clusters`` and ``weights (P, 4)`` are those of `gvcodecs.mcgv.motion.skinning.Weights`.
+    """
+    shared, neighbours, starts = count_shared(clusters, weights, n_clusters), list[int](), [0]
     for k in range(n_clusters):
         before = shared[k, :k]
         near = np.argsort(-before, kind="stable")[:MOST]  # of equals the lower number
@@ -35,9 +37,9 @@ def row_order(weights: Weights, n_clusters: int) -> CausalOrder:
     )
 
 
-def count_shared(weights: Weights, n_clusters: int) -> Int64:
+def count_shared(clusters: Int32, weights: Int32, n_clusters: int) -> Int64:
     """``(K, K)`` how many points follow both clusters; the diagonal means nothing."""
-    clusters, used = weights.clusters.astype(np.int64), weights.weights > 0
+    clusters, used = clusters.astype(np.int64), weights > 0
     counts = np.zeros(n_clusters * n_clusters, np.int64)
     for a in range(clusters.shape[1]):
         for b in range(a):

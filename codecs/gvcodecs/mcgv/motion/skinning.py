@@ -21,7 +21,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from gvcodecs.mcgv.motion.row_neighbours import row_order
 from gvpipe.foundation.arrays import Float64, Int32
+from gvpipe.runtime.forks import kept
+from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.gram import block_products
 from gvpipe.trajectory.sparse_rows import as_rows
 
@@ -67,6 +70,11 @@ class Blend:
         from gvcodecs.mcgv.motion.blend_kernels import blend_rows
 
         return blend_rows(self.homogeneous, *self._parts, self.inverse)
+
+    @kept
+    def row_order(self) -> CausalOrder:
+        """The causal order of the transforms' rows; all segments have the same."""
+        return row_order(*self.weights, self.n_clusters)
 
     @property
     def _parts(self) -> tuple[Int32, Float64]:

@@ -17,6 +17,7 @@ The bitstream, where ``[varint] 0`` stands only before rows that have causal nei
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ from gvpipe.trajectory.basis import (
     find_principal,
     fit_coefficients,
 )
-from gvpipe.trajectory.causal_order import independent_order
+from gvpipe.trajectory.causal_order import CausalOrder, independent_order
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
 from gvpipe.trajectory.trellis_search import BASIS_PENALTY, PENALTY
 
@@ -81,7 +82,7 @@ def encode_trajectories(
     head, basis = encode_basis(principal, n_components, len(rows), step, penalty=BASIS_PENALTY)
     wanted, orders = fit_coefficients(rows, basis), [(b"", independent_order(len(rows)))]
     if weights:
-        orders.append((varint(PREDICTED), row_order(weights, len(rows) // 4)))
+        orders.append((varint(PREDICTED), row_order(*weights, len(rows) // 4)))
     sections = []
     for mark, order in orders:
         data, decoded = encode_vectors(wanted, step, order, penalty=PENALTY, factor=factor)
@@ -90,15 +91,25 @@ def encode_trajectories(
 
 
 def decode_trajectories(
-    data: bytes, weights: Weights, n_clusters: int, n_frames: int, step: float, name: str, *, budget: Budget = UNLIMITED
+    data: bytes,
+    find_order: Callable[[], CausalOrder],
+    n_clusters: int,
+    n_frames: int,
+    step: float,
+    name: str,
+    *,
+    budget: Budget = UNLIMITED,
 ) -> Trajectories:
-    """Mirror of `encode_trajectories`; raises `CorruptFile`, or `OverBudget` if they take more than the file may."""
-    cursor = Cursor(data, name)
+    """Mirror of `encode_trajectories`; raises `CorruptFile`, or `OverBudget` if they take more than the file may.
+
+    ``find_order`` gives the rows' causal order (`row_neighbours.row_order`), if the section asks for it.
+    """
+    cursor, n_rows = Cursor(data, name), 4 * n_clusters
     length = cursor.varint(cursor.left, "a length")
-    is_predicted = length == PREDICTED
+    is_predicted = data[:1] == varint(PREDICTED)
     head = cursor.take(cursor.varint(cursor.left, "a length") if is_predicted else length)
-    basis = decode_basis(head, n_frames, 4 * n_clusters, step, name, budget=budget)
-    order = row_order(weights, n_clusters) if is_predicted else independent_order(4 * n_clusters)
+    basis = decode_basis(head, n_frames, n_rows, step, name, budget=budget)
+    order = find_order() if is_predicted else independent_order(n_rows)
     coefficients = decode_vectors(cursor.rest(), basis.vectors.shape[1], step, order, name)
     return Trajectories(basis, coefficients)
 

@@ -10,7 +10,8 @@ import { corrupt } from "./errors.js";
 import { checkHeader, checkInteger, isObject } from "./header.js";
 import { inflateRaw } from "./inflate.js";
 
-const NAME = new RegExp(`^[a-z0-9.]{1,${MAX_NAME}}$`);
+const HEADER = "header";
+const NAME = new RegExp(`^[a-z][a-z0-9.]{0,${MAX_NAME - 1}}$`); // a letter first: keys that are numbers would come before others
 
 /**
  * The header, and bytes of each section in order.
@@ -28,8 +29,8 @@ export async function readCompact(cursor, dictionary) {
 function readLengths({ sections }) {
   if (!isObject(sections)) throw corrupt("header", "it does not list its sections");
   const names = Object.keys(sections);
-  if (names.length > MAX_SECTIONS || !names.every((name) => NAME.test(name))) {
-    throw corrupt("header", "the names of its sections are not of a to z, 0 to 9 and dots");
+  if (names.length > MAX_SECTIONS || !names.every((name) => NAME.test(name) && name !== HEADER)) {
+    throw corrupt("header", "the names of its sections are not a letter and up to 63 of a to z, 0 to 9 and dots");
   }
   return new Map(names.map((name) => [name, checkInteger(sections, name, 0, MAX_LENGTH)]));
 }

@@ -23,6 +23,8 @@ export class Blend {
     this.clusters = weights.clusters;
     this.parts = Float64Array.from(weights.weights, (weight) => weight / TOTAL);
     this.coordinates = homogeneous(base); // (P, 3): the fourth is 1
+    /** Of the transforms' rows, once a segment has asked for it. @type {import("../trajectory/causal_order.js").CausalOrder | undefined} */
+    this.rowOrder = undefined;
     this.factors = new Float64Array(16 * nClusters); // (K, 4, 4) lower triangles, flat
     this.#addEnergies();
     for (let at = 0; at < this.factors.length; at += 16) factorise(this.factors.subarray(at, at + 16));

@@ -22,7 +22,7 @@ export class Trajectories {
     const cursor = new Cursor(isPredicted ? data.subarray(1) : data, name);
     this.basis = decodeBasis(kernels, cursor.block(), frames, 4 * clusters, step, name, 3, budget);
     /** (4K, R) flat. */
-    const order = placed(kernels, isPredicted ? rowOrder(blend, clusters) : independentOrder(4 * clusters));
+    const order = placed(kernels, isPredicted ? (blend.rowOrder ??= rowOrder(blend, clusters)) : independentOrder(4 * clusters));
     this.coefficients = kernels.view(decodeVectors(kernels, order, cursor.rest(), this.basis.components, step, name)).slice();
     this.n = 4 * clusters;
   }

@@ -60,6 +60,8 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const rest = cursor.rest();
   const flags = flagsOf(rest);
   const onTrellis = flags !== null;
+  if (flags && predictor !== "kalman") throw cursor.corrupt("its flags are those of the predictor kalman");
+  if (onTrellis && rest.length === 1 && n * components > 0) throw cursor.corrupt("it has no words");
   const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const wanted = blocks ?? bounds.shape[0] - 1;
   const decoded = given ?? kernels.array("float64", [n, components]);
@@ -121,7 +123,10 @@ function noisesOf(kernels, residuals, [before, first], step, flags) {
   const sums = new Float64Array(components);
   for (let i = 2 * before * components, c = 0; i < 2 * first * components; i += 2, c = (c + 1) % components)
     sums[c] += Math.abs(words[i + 1] * 2 ** 32 + (words[i] >>> 0));
-  return noises.map((noise, c) => noise * (1 + (sums[c] / (first - before) / 4) ** 2));
+  return noises.map((noise, c) => {
+    const mean = sums[c] / (first - before) / 4;
+    return noise * (1 + mean * mean);
+  });
 }
 
 /**

@@ -23,7 +23,7 @@ def test_trajectories_round_trip(n_clusters: int, n_frames: int) -> None:
     sizes = []
     for step in (1.0, 0.05):
         data, coded = encode_trajectories(rows, step)
-        decoded = decode_trajectories(data, NOBODY, n_clusters, n_frames, step, "transforms.0")
+        decoded = decode_trajectories(data, lambda: row_order(*NOBODY, n_clusters), n_clusters, n_frames, step, "transforms.0")
         assert np.allclose(decoded.rows(0, n_frames), coded.rows(0, n_frames), rtol=0, atol=1e-9)
         assert np.allclose(decoded.rows(n_frames // 2, n_frames), coded.rows(0, n_frames)[:, 3 * (n_frames // 2) :])
         error = np.sqrt(np.square(decoded.rows(0, n_frames) - rows).mean())
@@ -40,17 +40,17 @@ def test_hostile_trajectories() -> None:
 
 
 def check_damaged(data: bytes, weights: Weights) -> None:
-    draw = np.random.default_rng(0)
+    draw, order = np.random.default_rng(0), row_order(*weights, 3)
     for _ in range(100):
         changed = bytearray(data[: draw.integers(1, len(data) + 1)])
         changed[draw.integers(len(changed))] = draw.integers(256)
         try:
-            assert decode_trajectories(bytes(changed), weights, 3, 10, 0.1, "transforms.0").rows(0, 10).shape == (12, 30)
+            assert decode_trajectories(bytes(changed), lambda: order, 3, 10, 0.1, "transforms.0").rows(0, 10).shape == (12, 30)
         except CorruptFile:
             continue
     for cut in range(len(data)):
         with pytest.raises(CorruptFile):
-            decode_trajectories(data[:cut], weights, 3, 10, 0.1, "transforms.0")
+            decode_trajectories(data[:cut], lambda: order, 3, 10, 0.1, "transforms.0")
 
 
 def test_errors_of_clusters_that_share_points_make_up_for_one_another() -> None:
@@ -80,7 +80,7 @@ def test_rows_follow_clusters_that_share_points() -> None:
     weights = Weights(
         np.array([[0, 2], [2, 0], [1, 2], [3, 0]], np.int32), np.array([[40, 24], [40, 24], [40, 24], [64, 0]], np.int32)
     )
-    order = row_order(weights, 4)
+    order = row_order(*weights, 4)
     near = [order.neighbours[a:b].tolist() for a, b in pairwise(order.starts)]
     assert near[:3] == [[], [0], [0, 1]]
     assert near[8:11] == [[0, 4], [1, 5, 8], [2, 6, 8, 9]]  # two points with cluster 0, one with 1
@@ -97,5 +97,5 @@ def test_clusters_that_move_alike_predict_one_another() -> None:
     data, coded = encode_trajectories(rows, 0.1, None, weights)
     assert data[0] == PREDICTED
     assert len(data) < len(encode_trajectories(rows, 0.1)[0])
-    decoded = decode_trajectories(data, weights, 24, 40, 0.1, "transforms.0")
+    decoded = decode_trajectories(data, lambda: row_order(*weights, 24), 24, 40, 0.1, "transforms.0")
     assert np.allclose(decoded.rows(0, 40), coded.rows(0, 40), rtol=0, atol=1e-9)
