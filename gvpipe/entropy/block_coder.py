@@ -136,7 +136,7 @@ def check_status(cursor: Cursor, status: int) -> None:
     if status == NO_TABLE:
         raise cursor.corrupt("a context is used that has no table")
     if status == OUT_OF_RANGE:
-        raise cursor.corrupt("a residual is out of range")
+        raise cursor.corrupt("a value is out of range")
     if status:
         raise cursor.corrupt("its range-coded data do not decode")
 

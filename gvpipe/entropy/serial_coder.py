@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.container.cursor import Cursor
+from gvpipe.entropy.block_coder import check_end, check_status
 from gvpipe.entropy.open_stream import open_stream
 from gvpipe.entropy.serial_tables import bits_of, read_tables, write_tables
 from gvpipe.entropy.tokens import MAX_TOKENS, tokenise
@@ -70,15 +71,8 @@ class SerialDecoder:
 
     def end(self) -> None:
         """Raise `CorruptFile` if a kernel met an error, or left words unread."""
-        from gvpipe.entropy import range_decoder
-        from gvpipe.entropy.block_kernels import NO_TABLE, OUT_OF_RANGE
-
-        status = int(self.coder.progress[1])
-        if status:
-            wrong = {NO_TABLE: "a context is used that has no table", OUT_OF_RANGE: "a value is out of range"}
-            raise self._cursor.corrupt(wrong.get(status, "its range-coded data do not decode"))
-        if not range_decoder.may_be_exhausted(self.coder.stream.state, self.coder.stream.words):
-            raise self._cursor.corrupt("range-coded data are left over")
+        check_status(self._cursor, int(self.coder.progress[1]))
+        check_end(self._cursor, self.coder.stream.state, self.coder.stream.words)
 
 
 def encode_serial(values: Int64, contexts: Int64, n_contexts: int) -> bytes:
