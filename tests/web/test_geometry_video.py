@@ -312,7 +312,7 @@ BROKEN: dict[str, tuple[str, Callable[[bytes], bytes]]] = {
     "last section": ("corrupt", lambda data: flipped(data, len(data) - 5)),
     "no version": ("corrupt", lambda data: _with_version(data, 255)),
     "header": ("corrupt", lambda data: flipped(data, data.rindex(BOX_UUID.bytes) + 24)),
-    "picture": ("corrupt", lambda data: flipped(data, data.index(b"mdat") + 900)),
+    "picture": ("corrupt", lambda data: flipped(data, data.index(b"mdat") + 100)),
 }
 
 

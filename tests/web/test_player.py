@@ -207,7 +207,7 @@ def test_a_corrupt_file_shows_an_error_in_the_page(
         const message = element.shadowRoot.querySelector("[role=alert]");
         return [message.textContent, message.checkVisibility(), element.shadowRoot.querySelector(".bar").inert];"""
     )
-    assert "is corrupt: its checksum does not match" in shown[0]
+    assert "the checksum of its payload does not match" in shown[0]
     assert shown[1:] == [True, True]
     sound = encode_file(site, waving())
     recovered = player(f"{LOAD} return element.shadowRoot.querySelector('.message').textContent", sound.name)
