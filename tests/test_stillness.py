@@ -115,6 +115,7 @@ def test_awkward_inputs(codec: str, settings: dict[str, Any], name: str, few: st
     assert np.abs(decoded.astype(np.float64) - frames).max() <= 0.02 * extent + 1e-6 * np.abs(frames).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("codec", "settings"), [*PICTURES, *SLOW_PICTURES])
 def test_pictures_are_of_distinct_frames(codec: str, settings: dict[str, Any], tmp_path: Path) -> None:
     """The video lacks repeated frames, and corrections, segments and groups of pictures are of distinct ones."""

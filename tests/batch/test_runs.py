@@ -121,6 +121,7 @@ def test_refused_before_anything_runs(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_other_settings_are_refused_where_files_have_those(inputs: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.npz").write_text("")
     assert encode_all("bad.npz", "out", "pca", workers=1).failed

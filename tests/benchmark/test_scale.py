@@ -62,6 +62,7 @@ def test_growth() -> None:
     assert table(LONG).endswith("| 1.0 | 1.0 | 300 | - | - | - |")
 
 
+@pytest.mark.slow
 def test_pictures(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     paths = draw(REPORT, tmp_path / "plots")

@@ -102,6 +102,7 @@ def test_meshes_of_several_processes_keep_their_order(monkeypatch: pytest.Monkey
     assert [int(np.unique(vertex).size) for vertex, _, _, _ in found] == [2 * n + 2 for n in sizes]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["time.sleep(600)", "sys.exit(3)", "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"])
 def test_a_process_that_hangs_or_dies_once(first: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _use(SECOND_TIME.format(tries=str(tmp_path / "tries"), first=first), tmp_path, monkeypatch)

@@ -73,6 +73,7 @@ def test_pictures_are_compared_texel_by_texel() -> None:
     assert compare(_shown(_png(first[0])), _shown(cut)).textures["skin"].rgb_psnr is None
 
 
+@pytest.mark.slow
 def test_other_pictures_are_compared_on_the_surface(monkeypatch: pytest.MonkeyPatch) -> None:
     """Other triangles, another place in the picture, another size: places have the same colours, or a known error."""
     monkeypatch.setattr(texture_errors, "GRID", 65)

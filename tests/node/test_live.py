@@ -95,6 +95,7 @@ def test_a_page_may_be_there_before_the_first_clip(node: Ask, server: tuple[str,
     timer.join()
 
 
+@pytest.mark.slow
 def test_what_plays_waits_for_frames_and_ends_with_the_file(node: Ask, server: tuple[str, Served], states: list[bytes]) -> None:
     url, served = server
     node("join", url=url)

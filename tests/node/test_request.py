@@ -28,6 +28,7 @@ def test_more_bytes_than_are_asked_for(has_length: bool) -> None:
         assert ask(url, 99_999) == f"{url} has more than 99999 bytes, which is all that a page takes of it; open it in Python"
 
 
+@pytest.mark.slow
 def test_an_answer_that_takes_too_long() -> None:
     with serving(bytes(1000)) as (url, served):
         served.drip = 0.05

@@ -123,6 +123,7 @@ def moved() -> MeshSequence:
     return replace(waves, positions=still, fields=fields)
 
 
+@pytest.mark.slow
 def test_warp(tmp_path: Path, run: Any) -> None:
     given, waves = moved(), waving(4, 5)
     gvpipe.write(given, tmp_path / "in.npz")

@@ -471,6 +471,7 @@ library_worker.serve(answer)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the system has no such limit")
 @pytest.mark.usefixtures("new_processes")
 def test_library_that_takes_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -499,6 +500,7 @@ def many_copies(folder: Path, copies: int) -> Path:
     return stage(folder, mesh + body)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such limit")
 def test_memory_follows_from_the_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(library_process, "start_process", start_with_little_memory)
@@ -537,6 +539,7 @@ def test_array_of_a_length_that_the_file_does_not_have(tmp_path: Path, count: in
     assert "\n" not in str(caught.value) and str(count) not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("new_processes")
 def test_many_files_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many files that are open, the last ones have a process; the others start one when they are asked."""
