@@ -60,7 +60,7 @@ class Encoder(NamedTuple):
 ENCODERS = {
     "h264": Encoder(
         "libx264",
-        {"preset": "medium", "x264-params": f"crf={{crf}}:keyint={GROUP}:threads=1:log-level=0"},
+        {"preset": "medium", "x264-params": f"crf={{crf}}:keyint={GROUP}:threads=1:cpu-independent=1:log-level=0"},
         45,
         12,
         "avc1",

@@ -58,6 +58,7 @@ X264 = {
     "b-adapt": 0,
     "scenecut": 0,
     "threads": 1,
+    "cpu-independent": 1,  # else a picture may take other bytes on ARM
     "log-level": 0,
 }
 X264["8x8dct"] = 1  # makes the profile High with every preset, ultrafast too
