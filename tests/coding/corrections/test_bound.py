@@ -95,7 +95,7 @@ def test_every_vertex_keeps_the_bound(codec: str, name: str, tmp_path: Path) -> 
 def test_bounds_from_coarse_to_float32(codec: str, percent: float, tmp_path: Path) -> None:
     """Down to where float32 itself has hardly finer steps; and half of the bound costs more bytes.
 
-    But for 2 % of them: the search for the smallest file tries some qualities, not all.
+    But for 3 % of them: the search for the smallest file tries some qualities, not all.
     """
     sequence, path = waving(12, 20), tmp_path / "a.mp4"
     bound = percent / 100 * frame_diagonal(sequence)
@@ -103,7 +103,7 @@ def test_bounds_from_coarse_to_float32(codec: str, percent: float, tmp_path: Pat
     assert largest_error(sequence, path) <= bound
     size = path.stat().st_size
     gvpipe.encode(sequence, path, codec, max_error=2 * bound)
-    assert path.stat().st_size <= 1.02 * size
+    assert path.stat().st_size <= 1.03 * size
 
 
 @each_codec
