@@ -23,12 +23,12 @@ from typing import Any
 
 from gvpipe.container.bitstream import CHECKSUM, HEADER, VERSION, Bitstream, check_version, parse_header
 from gvpipe.container.boxes import BOX
-from gvpipe.container.compact_header import compact_values, pack_compact, section_lengths, unpack_compact
+from gvpipe.container.compact_header import checked_content, compact_values, pack_compact, section_lengths, unpack_compact
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject
 from gvpipe.container.shared_sections import FindSection, find_shared
 from gvpipe.foundation.budget import UNLIMITED, Budget
-from gvpipe.foundation.errors import TruncatedFile, corrupt
+from gvpipe.foundation.errors import TruncatedFile
 
 MAGIC = b"gvbare\r\n"
 PREFIX = struct.Struct("<H")
@@ -86,9 +86,7 @@ def unpack_bare(payload: bytes, budget: Budget = UNLIMITED, find: FindSection | 
         raise TruncatedFile("the payload ends inside its header; get the file again from its source")
     (version,) = PREFIX.unpack_from(payload, len(MAGIC))
     check_version(version, WITH_SHARED)
-    content = payload[: -CHECKSUM.size]
-    if CHECKSUM.unpack(payload[-CHECKSUM.size :]) != (zlib.crc32(content),):
-        raise corrupt("the checksum of its payload does not match")
+    content = checked_content(payload)
     cursor = Cursor(content, HEADER)
     cursor.take(start)
     if version < 1:

@@ -16,10 +16,11 @@ import zlib
 from collections.abc import Mapping
 from typing import Any
 
-from gvpipe.container.bitstream import HEADER, MAX_HEADER, MAX_NAME, MAX_SECTIONS, NAME, Bitstream, header_values
+from gvpipe.container.bitstream import CHECKSUM, HEADER, MAX_HEADER, MAX_NAME, MAX_SECTIONS, NAME, Bitstream, header_values
 from gvpipe.container.cursor import Cursor, pack_block
 from gvpipe.container.json_object import JsonObject, unpack_json
 from gvpipe.foundation.budget import Budget
+from gvpipe.foundation.errors import corrupt
 
 MAX_LENGTH = 1 << 40  # of a section, bytes
 SECTIONS = "sections"
@@ -44,6 +45,14 @@ def pack_compact(values: Mapping[str, Any], dictionary: bytes) -> bytes:
 def unpack_compact(cursor: Cursor, dictionary: bytes, budget: Budget) -> JsonObject:
     """Mirror of `pack_compact`; raises `CorruptFile`, `OverBudget`."""
     return unpack_json(cursor.block(), HEADER, MAX_HEADER, budget, zlib.decompressobj(RAW, zdict=dictionary))
+
+
+def checked_content(payload: bytes) -> bytes:
+    """A payload without the checksum at its end; raises `CorruptFile` if that does not match."""
+    content = payload[: -CHECKSUM.size]
+    if CHECKSUM.unpack(payload[-CHECKSUM.size :]) != (zlib.crc32(content),):
+        raise corrupt("the checksum of its payload does not match")
+    return content
 
 
 def section_lengths(header: JsonObject) -> dict[str, int]:

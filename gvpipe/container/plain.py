@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import Any
 
 from gvpipe.container.bitstream import CHECKSUM, HEADER, Bitstream, check_version, parse_header
-from gvpipe.container.compact_header import compact_values, pack_compact, section_lengths, unpack_compact
+from gvpipe.container.compact_header import checked_content, compact_values, pack_compact, section_lengths, unpack_compact
 from gvpipe.container.cursor import Cursor
 from gvpipe.container.json_object import JsonObject
 from gvpipe.foundation.budget import UNLIMITED, Budget
@@ -74,9 +74,7 @@ def unpack_plain(payload: bytes, budget: Budget = UNLIMITED) -> tuple[Bitstream,
     if len(payload) <= 1 + TAIL:
         raise TruncatedFile("the payload ends inside its header; get the file again from its source")
     check_plain_version(payload)
-    content = payload[: -CHECKSUM.size]
-    if CHECKSUM.unpack(payload[-CHECKSUM.size :]) != (zlib.crc32(content),):
-        raise corrupt("the checksum of its payload does not match")
+    content = checked_content(payload)
     cursor = Cursor(content[: -TRACK.size], HEADER)
     cursor.take(1)
     header = unpack_compact(cursor, DICTIONARY, budget)
