@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvpipe.connectivity.base_mesh import MAX_PER_BYTE, check_draco_header
-from gvpipe.connectivity.topology_only import decode_triangles, encode_triangles
+from gvpipe.connectivity.topology_only import CodedTriangles, decode_triangles, encode_triangles
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.cursor import Cursor, pack_block, varint
 from gvpipe.foundation.arrays import Array, Int32, Int64
@@ -30,8 +30,12 @@ MAX_POINTS = 1 << 15  # larger meshes take too long
 MAX_BYTES = 24  # per point, of a stream
 
 
-def encode_adaptive_mesh(points: Array, faces: Array, is_fitted: bool = True) -> tuple[bytes, Array, Array]:
+def encode_adaptive_mesh(
+    points: Array, faces: Array, is_fitted: bool = True, triangles: CodedTriangles | None = None
+) -> tuple[bytes, Array, Array]:
     """Code lattice ``points (P, 3)``, 0..2**31 - 1, with triangles ``faces (T, 3)``; ``is_fitted``: with a forecast.
+
+    ``triangles`` are those of `encode_triangles`, if they are coded already.
 
     Returns:
         The stream, the given point ``(P,)`` of each decoded one, and the decoded triangles.
@@ -40,7 +44,7 @@ def encode_adaptive_mesh(points: Array, faces: Array, is_fitted: bool = True) ->
     from gvpipe.connectivity.position_kernels import code_positions
     from gvpipe.entropy.decision_kernels import finish, start_encoder
 
-    parts, permutation, coded = encode_triangles(faces.astype(np.int64), len(points))
+    parts, permutation, coded = triangles or encode_triangles(faces.astype(np.int64), len(points))
     state, data = start_encoder(), np.zeros(MAX_BYTES * len(points) + 64, np.uint8)
     moved = np.ascontiguousarray(points[permutation], np.int64)
     if is_fitted:

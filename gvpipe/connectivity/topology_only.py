@@ -89,7 +89,11 @@ def encode_mesh(faces: Int32, points: Array, reorder: bool) -> tuple[EncodedMesh
     return EncodedMesh(streams, coded.order, coded.permutation), decoded
 
 
-def encode_triangles(faces: Array, n_points: int) -> tuple[tuple[bytes, bytes, bytes, int], Array, Array]:
+CodedTriangles = tuple[tuple[bytes, bytes, bytes, int], Array, Array]
+"""What `encode_triangles` returns."""
+
+
+def encode_triangles(faces: Array, n_points: int) -> CodedTriangles:
     """Code triangles ``(T, 3)`` over P points.
 
     Returns:

@@ -22,6 +22,7 @@ import numpy as np
 from gvpipe.connectivity import adaptive_mesh, candidate_order
 from gvpipe.connectivity.base_mesh import BaseMesh, EncodedMesh, decode_base, encode_base, keep_mesh, may_run_beside
 from gvpipe.connectivity.seams import decode_seams, encode_seams
+from gvpipe.connectivity.topology_only import encode_triangles
 from gvpipe.connectivity.vertex_order import MAX_VERTICES
 from gvpipe.container.bitstream import Bitstream
 from gvpipe.container.cursor import Cursor, pack_block
@@ -100,8 +101,9 @@ def _encode_mesh(lattice: Array, faces: Array, adaptive: bool) -> tuple[bytes, i
     mesh, order, base = encode_base(lattice, faces)
     flag = 0
     if adaptive and len(lattice) <= adaptive_mesh.MAX_POINTS:
+        coded = encode_triangles(faces.astype(np.int64), len(lattice))
         for own_flag, few in ((ADAPTIVE_MESH, FEW_POINTS), (FITTED_MESH, FEW_FITTED)):
-            own, permutation, triangles = adaptive_mesh.encode_adaptive_mesh(lattice, faces, own_flag == FITTED_MESH)
+            own, permutation, triangles = adaptive_mesh.encode_adaptive_mesh(lattice, faces, own_flag == FITTED_MESH, coded)
             if len(own) < (1 if len(lattice) <= few else WORTH_WAITING) * len(mesh):
                 mesh, flag, order = own, own_flag, permutation
                 base = BaseMesh(lattice[order].astype(np.int32), triangles.astype(np.int32))
