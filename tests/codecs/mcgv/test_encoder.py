@@ -23,6 +23,8 @@ from gvpipe.container import bitstream
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
 
+ROBOT = Path(__file__).parents[3] / "samples" / "robot.npz"
+
 
 @pytest.mark.parametrize("scale", [1e-38, 1e-30, 1e-10, 1e10, 1e30, 3e37])
 def test_any_float32_scale(sequence: MeshSequence, scale: float) -> None:
@@ -118,3 +120,15 @@ def test_a_blend_asked_for_again_is_the_same() -> None:
     others = (start, 2e-3), (dataclasses.replace(start, step=2e-3), 1e-3), (base_frame.begin(job, 1e-2, 1e-2), 1e-3)
     for other, target_error in others:
         assert fit_skinning(job, start, 1e-3)[0] is not fit_skinning(job, other, target_error)[0]
+
+
+def test_rigid_parts_have_one_error_at_all_qualities(tmp_path: Path) -> None:
+    """Files of the sample robot, whose parts are rigid, are about the same below quality 90."""
+    robot = gvpipe.read(ROBOT)
+    files = []
+    for quality in (50, 80):
+        n_bytes = gvpipe.encode(robot, tmp_path / "a.mp4", quality=quality).bytes
+        files.append((n_bytes, measure_errors(robot, gvpipe.decode(tmp_path / "a.mp4").read).kg or 0.0))
+    (few, coarse), (many, fine) = files
+    assert abs(many - few) < 0.03 * many
+    assert abs(fine - coarse) < 0.05 * coarse < 0.05 * error_of(90)

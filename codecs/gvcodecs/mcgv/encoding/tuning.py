@@ -31,7 +31,7 @@ class Tuning:
         large_base: part of the bytes that a base frame must take for the second of them to be tried (0068).
         rebased_by: a coarser base frame has so many times the lattice step at least (0068).
         published_error: in lattice steps, what the published mode's base frame leaves at least (0067).
-        most_transforms: part of the bytes that transforms may take for the error of rigid parts to be tried (0067).
+        least_rigid: part of the points that move with one cluster alone, for the error of rigid parts to be tried (0067).
         fine_lattices: lattice steps of base frames for it, in those errors: the smallest mesh is taken (0067).
         fine_worth: bytes may grow by the quotient of the errors to this power (0067).
         hopeless: in those errors: where a blend leaves more at any step, it is not tried (0067).
@@ -42,7 +42,7 @@ class Tuning:
     blended_error: tuple[float, float] = (0.9, 0.99)
     affine_error: tuple[float, float] = (1.0, 1.1)
     bare_error: tuple[float, float] = (0.935, 0.955)
-    fine_error: tuple[float, float] = (0.88, 1.0)
+    fine_error: tuple[float, float] = (0.96, 1.0)
     large_first: float = 0.81
     keeps_bare_blend: tuple[float, float] = (0.75, 1.4)
     keeps_blend: tuple[float, float] = (0.8, 1.4)
@@ -58,7 +58,7 @@ class Tuning:
     large_base: float = 0.25
     rebased_by: float = 1.2
     published_error: float = 0.43
-    most_transforms: float = 0.25
+    least_rigid: float = 0.99
     fine_lattices: tuple[float, ...] = (1.05, 1.2, 1.35, 1.5)
     fine_worth: float = 0.3
     hopeless: float = 1.5

@@ -8,6 +8,8 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
+
 from gvcodecs.mcgv.base.base_lattice import AFFINE_BITS, base_step
 from gvcodecs.mcgv.encode_job import Job
 from gvcodecs.mcgv.encoding.bitstream_sizes import cost, count_bytes, count_picture_bytes
@@ -15,7 +17,6 @@ from gvcodecs.mcgv.encoding.candidate import Candidate, CandidateAnchor, rebase
 from gvcodecs.mcgv.encoding.initial_skinning import fit_skinning
 from gvcodecs.mcgv.encoding.step_trials import StepTrials
 from gvcodecs.mcgv.encoding.tuning import TUNING
-from gvpipe.container.bitstream import Bitstream
 from gvpipe.foundation.elementary import power
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step
@@ -61,9 +62,9 @@ def refine(trials: StepTrials, trial: StepTrial) -> StepTrial:
     Parts that move rigidly are exact but for the rounding of base and transforms. The published mode leaves that error at every
     quality, so that a default file would else be the worse one.
     """
-    if _count_transform_bytes(trial.bitstream) > TUNING.most_transforms * count_bytes(trial.bitstream):
-        return trial
     job, candidate = trials.job, trials.candidate
+    if not _is_rigid(candidate):
+        return trial
     fine_error = TUNING.published_error * Lattice.over(job.sequence.read(0, 1)[0], AFFINE_BITS).step
     rounded = candidate.start.lattice.step / 2  # root mean square error that rounding the base frame leaves
     blend_error = math.sqrt(max(trial.rest**2 - rounded**2, 0.0))
@@ -149,5 +150,7 @@ def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrial
     return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error, trials.candidate.fitted)[0]))
 
 
-def _count_transform_bytes(bitstream: Bitstream) -> int:
-    return sum(len(data) for name, data in bitstream.sections.items() if name.startswith("transforms"))
+def _is_rigid(candidate: Candidate) -> bool:
+    """Whether nearly all points move with one cluster alone: others bend or stretch."""
+    assert candidate.fitted
+    return float(np.mean(np.count_nonzero(candidate.fitted.weights.weights, axis=1) == 1)) >= TUNING.least_rigid
