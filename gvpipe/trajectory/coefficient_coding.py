@@ -31,7 +31,7 @@ from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, Residuals, check_residuals, context_inputs, level_of
-from gvpipe.trajectory.prediction import predict_vectors
+from gvpipe.trajectory.prediction import predict_vectors, start_vectors
 from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, block_steps, find_noises
 from gvpipe.trajectory.trellis_coding import TrellisDecoder, encode_numbers
 from gvpipe.trajectory.trellis_search import search
@@ -51,6 +51,8 @@ def encode_vectors(
     penalty: float | None = None,
     factor: Float64 | None = None,
     flags: int = 0,
+    known: Float64 | None = None,
+    is_exact: bool = False,
 ) -> tuple[bytes, Float64]:
     """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``; on a trellis but for the last bits.
 
@@ -66,12 +68,14 @@ def encode_vectors(
             None: residuals of plain rounding.
         factor: how errors of the vectors add up, on a trellis (`gvpipe.trajectory.trellis_search.search`).
         flags: of a stream on a trellis (`gvpipe.trajectory.trellis`).
+        known: ``(n, K)`` decoded first components of all vectors, on a trellis: the others alone are coded.
+        is_exact: as of `gvpipe.trajectory.trellis_search.search`, on a trellis.
 
     Raises:
         InputError: a value is too large for the step.
     """
     if penalty is not None:
-        return _encode_trellis(target, causal, search(target, step, causal, given, penalty, factor, flags), flags)
+        return _encode_trellis(target, causal, search(target, step, causal, given, penalty, factor, flags, known, is_exact), flags)
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
     wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
@@ -111,13 +115,14 @@ def decode_vectors(
     predictor: str = "kalman",
     beta: float = 1.8,
     given: Float64 | None = None,
+    known: Float64 | None = None,
 ) -> Float64:
     """Mirror of `encode_vectors`: ``(n, R)``.
 
     Args:
         data: the bytes.
         n_components: R.
-        step, causal, predictor, beta, given: as for `encode_vectors`.
+        step, causal, predictor, beta, given, known: as for `encode_vectors`.
         name: of the section, for messages.
         n_blocks: decode the first so many blocks alone, other vectors stay 0; None: all.
 
@@ -127,23 +132,26 @@ def decode_vectors(
     from gvpipe.trajectory.context_kernels import decode_residuals
 
     cursor = Cursor(data, name)
+    n_coded = n_components - (0 if known is None else known.shape[1])
     if len(causal.order) * n_components > MAX_VALUES:  # zeros may cost no bits: believe no counts beyond this
         raise cursor.corrupt(f"{len(causal.order)} vectors of {n_components} components")
     head = cursor.block()
-    levels = np.cumsum(decode_integers(head, n_components, name=name))
+    levels = np.cumsum(decode_integers(head, n_coded, name=name))
     if ((levels < 0) | (levels > MAX_LEVEL)).any():
         raise cursor.corrupt("a magnitude level is out of range")
     rest = cursor.rest()
     flags = _flags(rest)
+    if known is not None and flags is None:
+        raise cursor.corrupt("it is not on a trellis, as vectors with known components are")
     if flags and predictor != "kalman":
         raise cursor.corrupt("its flags are those of the predictor kalman")
     coder = BlockDecoder(rest, N_CONTEXTS, name) if flags is None else TrellisDecoder(rest[1:], name)
     steps = block_steps(step if flags is None else step * FINENESS, len(causal.blocks) - 1, flags or 0).tolist()
     wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks
     n_vectors = int(causal.blocks[wanted])
-    decoded = np.zeros((len(causal.order), n_components)) if given is None else given.copy()
+    decoded = start_vectors((len(causal.order), n_components), given, known)
     inputs = context_inputs(causal, len(decoded), levels, wanted)
-    ranked, rows = np.zeros((n_vectors, n_components), np.int64), np.zeros((n_components, n_vectors), np.int64)
+    ranked, rows = np.zeros((n_vectors, n_coded), np.int64), np.zeros((n_coded, n_vectors), np.int64)
     residuals = Residuals(ranked, rows, inputs.usual.copy())
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
@@ -158,7 +166,7 @@ def decode_vectors(
     bounds = causal.blocks.tolist()
     for first, last in run_ahead(take, parts, len(parts), n_threads=1):  # predict while the next ones are decoded
         for b, end in pairwise([*range(first, last), last] if flags else [first, last]):
-            noises = find_noises(ranked[bounds[max(0, b - 1)] : bounds[b]], steps[b], flags or 0)
+            noises = find_noises(ranked[bounds[max(0, b - 1)] : bounds[b]], steps[b], flags or 0, n_components - n_coded)
             predict_vectors(causal, steps[b], ranked, decoded, None, predictor, beta, bounds[b], bounds[end], noises)
     if n_blocks is None:
         coder.end()

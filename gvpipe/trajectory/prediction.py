@@ -44,7 +44,8 @@ def predict_vectors(
     """Code vectors (``target`` given), filling ``residuals`` and ``decoded``, or fill ``decoded`` from ``residuals``.
 
     Args:
-        causal, step, residuals, decoded: as of `gvpipe.trajectory.prediction_kernels.VectorCoding`.
+        causal, step, residuals, decoded: as of `gvpipe.trajectory.prediction_kernels.VectorCoding`; ``kalman`` alone may know
+            components.
         target: ``(n, R)`` what to code, or None.
         predictor: one of `PREDICTORS`.
         beta: exponent of the radial function (rbf).
@@ -64,3 +65,17 @@ def predict_vectors(
         prediction_kernels.predict_rbf(coding, begin, stop, beta)
     else:
         getattr(prediction_kernels, f"predict_{predictor}")(coding, begin, stop)
+
+
+def start_vectors(shape: tuple[int, ...], given: Float64 | None, known: Float64 | None) -> Float64:
+    """Return what is decoded of vectors ``(n, R)`` before they are coded; the rest is 0.
+
+    Args:
+        shape: n, R.
+        given: ``(n, R)`` vectors that the order leaves out (`gvpipe.trajectory.causal_selection.leave_out`).
+        known: ``(n, K)`` the first components of all others.
+    """
+    decoded = np.zeros(shape) if given is None else given.copy()
+    if known is not None:
+        decoded[:, : known.shape[1]] = known
+    return decoded

@@ -27,7 +27,8 @@ class VectorCoding(NamedTuple):
     Args:
         causal: the order.
         step: quantisation step of every component.
-        residuals: ``(m, R)`` of the first m vectors of the order, in steps.
+        residuals: ``(m, R - K)`` of the first m vectors of the order, in steps. The first K components of all vectors are known:
+            they are in ``decoded``, and say more about the weights of the others.
         decoded: ``(n, R)`` components, by vector, in the order of transmission. Given vectors are there already.
         target: ``(n, R)`` what to code; ``(0, 0)``: decode.
         noises: ``(R,)`` variances of what no weights explain, of ``kalman``, squared units of the components.
@@ -143,13 +144,25 @@ def _predict_vector_lsp(coding: VectorCoding, i: int, fit: LeastSquares) -> None
 
 
 @inlined
+def n_known(coding: VectorCoding) -> int:
+    """K, how many components of all vectors are known."""
+    return int(coding.decoded.shape[1] - coding.residuals.shape[1])
+
+
+@inlined
 def code_component(coding: VectorCoding, i: int, vector: int, c: int, guess: float) -> float:
-    """Quantise component c of vector i of the order, if there is a target; decode it, and return by how much it is off."""
+    """Quantise component c of vector i of the order, if there is a target; decode it, and return by how much it is off.
+
+    Of a component that is known, return that alone.
+    """
+    own = c - n_known(coding)
+    if own < 0:
+        return coding.decoded[vector, c] - guess  # type: ignore[no-any-return]
     if len(coding.target):
         steps = (coding.target[vector, c] - guess) / coding.step
         whole = np.floor(abs(steps) + ROUND_UP)
-        coding.residuals[i, c] = whole if steps > 0 else -whole
-    change: float = coding.residuals[i, c] * coding.step
+        coding.residuals[i, own] = whole if steps > 0 else -whole
+    change: float = coding.residuals[i, own] * coding.step
     coding.decoded[vector, c] = guess + change
     return change
 

@@ -17,8 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gvpipe.foundation.arrays import Int32
+from gvpipe.foundation.budget import Budget
 from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
+
+KEPT_PER_VERTEX, KEPT_PER_TRIANGLE = 520, 40  # bytes, of `parallelogram_order`
+SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 2e-6, 0.5e-6
 
 if TYPE_CHECKING:
     from gvpipe.mesh.hierarchy_kernels import Hierarchy
@@ -40,6 +44,13 @@ def hierarchy_order(hierarchy: Hierarchy, overshoots: bool = True) -> CausalOrde
     return join_order(hierarchy, weights, variances)
 
 
+def keep_parallelograms(budget: Budget, n_vertices: int, n_triangles: int) -> None:
+    """Check that a file may take the memory and work of `parallelogram_order`; raises `OverBudget`."""
+    what = f"a traversal of {n_vertices} vertices and {n_triangles} triangles"
+    seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
+    budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
+
+
 def traversal_order(faces: Int32, n_vertices: int) -> CausalOrder:
     """Return the order of V vertices along a traversal of ``faces (T, 3)``, each predicted by a parallelogram (``navg``).
 
@@ -49,3 +60,15 @@ def traversal_order(faces: Int32, n_vertices: int) -> CausalOrder:
     from gvpipe.trajectory.spatial_kernels import weigh_traversal
 
     return weigh_traversal(np.ascontiguousarray(faces, np.int32), n_vertices)
+
+
+def parallelogram_order(faces: Int32, n_vertices: int) -> CausalOrder:
+    """Return the order of V vertices along a traversal of ``faces (T, 3)``, each predicted from all parallelograms that it ends.
+
+    For the components that are the shape itself, which is rough: all triangles are short here, a hierarchy's are not. Weights
+    start from the average of the parallelograms, a little of it the ring's average, as in D. Cohen-Or, R. Cohen and R. Irony,
+    "Multi-way Geometry Encoding", 2002, but for that part.
+    """
+    from gvpipe.trajectory.spatial_kernels import weigh_parallelograms
+
+    return weigh_parallelograms(np.ascontiguousarray(faces, np.int32), n_vertices)

@@ -51,8 +51,8 @@ def block_steps(step: float, n_blocks: int, flags: int) -> Float64:
     return steps
 
 
-def find_noises(before: Int64, step: float, flags: int) -> Float64:
-    """Variances ``(R,)`` of what the weights of ``kalman`` do not explain, squared units of the components.
+def find_noises(before: Int64, step: float, flags: int, n_known: int = 0) -> Float64:
+    """Variances ``(K + R,)`` of what the weights of ``kalman`` do not explain, squared units of the components.
 
     With `FINDS_NOISES`, what a component came out at in the block before adds to that of rounding.
 
@@ -60,11 +60,12 @@ def find_noises(before: Int64, step: float, flags: int) -> Float64:
         before: ``(m, R)`` residuals of the block before, in fine steps; m is 0 before the first.
         step: the fine one.
         flags: of the stream.
+        n_known: K, components before those of the stream, which are known.
     """
-    noises = np.full(before.shape[1], step * step)
+    noises = np.full(n_known + before.shape[1], step * step)
     if flags & FINDS_NOISES and len(before):
         means = np.abs(before).sum(axis=0) / len(before)
-        noises *= 1 + np.square(means / 4)
+        noises[n_known:] *= 1 + np.square(means / 4)
     return noises
 
 

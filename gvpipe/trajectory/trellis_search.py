@@ -21,7 +21,7 @@ from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import check_residuals, context_inputs, level_of
-from gvpipe.trajectory.prediction import predict_vectors
+from gvpipe.trajectory.prediction import predict_vectors, start_vectors
 from gvpipe.trajectory.trellis import FINENESS, block_steps, find_noises, first_tables
 
 BASIS_PENALTY, PENALTY = 0.25, 0.22  # of a bit that do best: of a basis, of coefficients
@@ -37,28 +37,32 @@ def search(
     penalty: float,
     factor: Float64 | None = None,
     flags: int = 0,
+    known: Float64 | None = None,
+    is_exact: bool = False,
 ) -> tuple[Int64, Int64, Float64]:
-    """Return the integers k and the residuals r, both ``(m, R)`` by rank, and what they decode to ``(n, R)``.
+    """Return the integers k and the residuals r, both ``(m, R - K)`` by rank, and what they decode to ``(n, R)``.
 
     Args:
-        target, causal, given: as of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
+        target, causal, given, known: as of `gvpipe.trajectory.coefficient_coding.encode_vectors`.
         step: of plain rounding, in the unit of the components.
         penalty: of a bit, in squared fine steps.
         factor: M ``(m, m)``, lower triangular, by rank. An error e ``(m, R)`` of the vectors counts as ``|M e|^2``, and each
             vector makes up for the errors of those before, as far as it can. None: an error counts as ``|e|^2``.
         flags: of the stream (`gvpipe.trajectory.trellis`).
+        is_exact: what vectors decode to is found as the decoder finds it, to the bit, for orders along which rounding grows.
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
     from gvpipe.trajectory.prediction_kernels import VectorCoding
     from gvpipe.trajectory.trellis_search_kernels import search_paths
 
-    shape = len(causal.order), target.shape[1]
+    n_known = 0 if known is None else known.shape[1]
+    shape = len(causal.order), target.shape[1] - n_known
     plain, residuals = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
-    decoded, found = (np.zeros(target.shape) if given is None else given.copy() for _ in range(2))
+    decoded, found = (start_vectors(target.shape, given, known) for _ in range(2))
     bounds = [0, *causal.blocks.tolist()]
     blocks = [*zip(bounds, bounds[1:], bounds[2:], block_steps(step, len(bounds) - 2, flags).tolist(), strict=False)]
     for before, begin, end, own in blocks:
-        noises = find_noises(plain[before:begin], own, flags)
+        noises = find_noises(plain[before:begin], own, flags, n_known)
         predict_vectors(causal, own, plain, decoded, target, "kalman", 0.0, begin, end, noises)
     check_residuals(plain)  # what follows holds for smaller ones alone
     fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
@@ -67,9 +71,11 @@ def search(
     contexts, numbers = find_all_contexts(fine, inputs), np.zeros(shape, np.int64)
     weights = np.zeros((0, 0)) if factor is None else factor
     for before, begin, end, own in blocks:
-        noises = find_noises(residuals[before:begin], own * FINENESS, flags)
+        noises = find_noises(residuals[before:begin], own * FINENESS, flags, n_known)
         coding = VectorCoding(causal, own * FINENESS, residuals, found, target, noises)
         search_paths(coding, contexts, _prices(), penalty, weights, begin, end, numbers)
+        if is_exact:
+            predict_vectors(causal, own * FINENESS, residuals, found, None, "kalman", 0.0, begin, end, noises)
     return numbers, residuals, found
 
 

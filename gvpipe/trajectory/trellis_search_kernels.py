@@ -10,7 +10,7 @@ from gvpipe.foundation.arrays import Float64, Int64, UInt8
 from gvpipe.runtime.compiled import compiled, inlined
 from gvpipe.runtime.lanes import LANES, load, same, store
 from gvpipe.trajectory.kalman_kernels import DOUBT
-from gvpipe.trajectory.prediction_kernels import VectorCoding, most_neighbours
+from gvpipe.trajectory.prediction_kernels import VectorCoding, most_neighbours, n_known
 from gvpipe.trajectory.trellis import N_QUANTISERS, N_STATES
 from gvpipe.trajectory.trellis_kernels import next_state, residual_of
 
@@ -54,33 +54,36 @@ class Paths(NamedTuple):
 def search_paths(
     coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float, factor: Float64, begin: int, end: int, found: Int64
 ) -> None:
-    """Fill ``coding.residuals (m, R)``, ``coding.decoded`` and ``found (m, R)``, the integers k, of ranks ``begin`` to ``end``.
+    """Fill ``coding.residuals (m, R - K)``, ``coding.decoded``, ``found (m, R - K)``, the integers k, of ranks ``begin`` to ``end``.
 
     Args:
         coding: ``step`` is the fine one.
-        contexts: ``(m, R)`` of the forecast.
+        contexts: ``(m, R - K)`` of the forecast.
         prices: ``(54, N_PRICED)`` bits.
         penalty: of a bit.
         factor: ``(m, m)`` of `gvpipe.trajectory.trellis_search.search`, or ``(0, 0)``.
     """
-    n_components = coding.residuals.shape[1]
+    n_components, known = coding.decoded.shape[1], n_known(coding)
     paths, aims = _empty_paths(n_components, most_neighbours(coding)), np.zeros(n_components)
     for rank in range(begin, end):
         weight = _aim(coding, rank, factor, aims)
         n = _begin(coding, rank, paths)
         for c in range(n_components):
             variance = _predict(coding, rank, c, n, paths)
-            _extend(aims[c], coding.step, prices[N_QUANTISERS * contexts[rank, c] :], penalty / weight, c, paths)
+            if c < known:
+                _learn(n, (coding.decoded[coding.causal.order[rank], c] - paths.guesses[0]) / variance, paths)
+                continue
+            _extend(aims[c], coding.step, prices[N_QUANTISERS * contexts[rank, c - known] :], penalty / weight, c, paths)
             _update(n, c, variance, coding.step, paths)
         state = 0
         for other in range(1, N_STATES):
             if paths.costs[other] < paths.costs[state] - MARGIN:
                 state = other
-        for c in range(n_components - 1, -1, -1):
-            found[rank, c] = number = paths.numbers[c, state]
+        for c in range(n_components - 1, known - 1, -1):
+            found[rank, c - known] = number = paths.numbers[c, state]
             coding.decoded[coding.causal.order[rank], c] = paths.values[c, state]
             state = paths.before[c, state]
-            coding.residuals[rank, c] = residual_of(number, state)
+            coding.residuals[rank, c - known] = residual_of(number, state)
 
 
 @compiled
@@ -207,6 +210,13 @@ def _update(n: int, c: int, variance: float, step: float, paths: Paths) -> None:
         for state in range(N_STATES):
             paths.next_weights[at + state] = paths.weights[at + paths.before[c, state]]
         store(paths.weights, at, load(paths.next_weights, at) + same(paths.products[j]) * changes)
+
+
+@inlined
+def _learn(n: int, change: float, paths: Paths) -> None:
+    """Take the weights of state 0, the only one, past a component that is known; ``change``: as of `Paths`."""
+    for j in range(n):
+        paths.weights[LANES * j] += paths.products[j] * change
 
 
 @compiled

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gvcodecs.pca.coefficients import Orders, encode_coefficients
 from gvcodecs.pca.header import MAX_SEGMENTS, VERSION, Header
 from gvcodecs.pca.reader import PcaReader, causal_order, coarse_levels
 from gvpipe.coding.codec import BaseCodec, Encoded, FrameReader, Memo
@@ -35,9 +36,10 @@ from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
 from gvpipe.trajectory.coefficient_coding import encode_vectors
 from gvpipe.trajectory.prediction import PREDICTORS
+from gvpipe.trajectory.spatial_neighbours import parallelogram_order
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
 from gvpipe.trajectory.trellis import FINDS_NOISES, GRADES, block_steps
-from gvpipe.trajectory.trellis_search import BASIS_PENALTY, PENALTY
+from gvpipe.trajectory.trellis_search import BASIS_PENALTY
 
 QUANTISERS = ("trellis", "plain")
 NOISE, COST = 1.15, 0.22  # on a trellis: squared error in that of rounding to the step; of a component (`count_components`)
@@ -93,17 +95,18 @@ class Pca(BaseCodec):
         causal, levels = memo("order", lambda: _order(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
         data, still = code_still(sequence, shared, target_error, memo)
         causal, moving = leave_out(causal, still.flags), shared.members[~still.flags]
+        first = leave_out(memo("first", lambda: parallelogram_order(mesh.point_faces, mesh.n_points)), still.flags) if self.on_trellis else None
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: data} if data else {})}
-        segments = _Segments(self, sequence, moving, still, causal, target_error)
+        segments = _Segments(self, sequence, moving, still, causal, first, target_error)
         spans = list(pairwise(bounds)) if still.n_moving else []
         coded = map_segments(_code_segment, segments, spans, lambda done: report("segments", done))
         for s, each in enumerate(coded):
             sections[f"basis.{s}"], sections[f"coefficients.{s}"] = each.basis, each.coefficients
         report("segments", 1)
         steps = tuple(each.step for each in coded)
-        header = Header(self.predictor, float(self.beta), n_segments, steps or (1.0,) * n_segments)
+        header = Header(self.predictor, float(self.beta), n_segments, steps or (1.0,) * n_segments, self.on_trellis)
         bitstream = self._bitstream(sequence, header.to_json(), sections, levels=levels)
         return Encoded(bitstream, shared.coded.permutation)
 
@@ -137,6 +140,7 @@ class _Segments(NamedTuple):
         moving: a vertex of each point that moves.
         still: points.
         causal: order of all points.
+        first: the same, of first components (`gvcodecs.pca.coefficients`), on a trellis.
         target_error: root mean square error of a vertex, model units.
     """
 
@@ -145,6 +149,7 @@ class _Segments(NamedTuple):
     moving: Int64
     still: StillPoints
     causal: CausalOrder
+    first: CausalOrder | None
     target_error: float
 
 
@@ -170,7 +175,7 @@ def _code_segment(segments: _Segments, span: tuple[int, int]) -> _Segment:
         most=still.most_components,
         **settings,
     )  # the trajectories go: what follows needs as much memory again
-    return _Segment(reduced.step, reduced.basis, _encode_coefficients(codec, reduced, still, segments.causal))
+    return _Segment(reduced.step, reduced.basis, _encode_coefficients(segments, reduced))
 
 
 def _trellis_settings(still: StillPoints, causal: CausalOrder, n_frames: int) -> dict[str, Any]:
@@ -189,11 +194,13 @@ def _trellis_settings(still: StillPoints, causal: CausalOrder, n_frames: int) ->
     }
 
 
-def _encode_coefficients(codec: Pca, reduced: Reduced, still: StillPoints, causal: CausalOrder) -> bytes:
+def _encode_coefficients(segments: _Segments, reduced: Reduced) -> bytes:
+    codec, still, causal = segments.codec, segments.still, segments.causal
     given = still.given(reduced.decoded)
     wanted = still.join(reduced.coefficients, given)
     if codec.predictor == "lsp":  # section 3.4: the small ones first
         wanted = np.ascontiguousarray(wanted[:, ::-1])
         given = None if given is None else np.ascontiguousarray(given[:, ::-1])
-    penalty, flags = (PENALTY, GRADES) if codec.on_trellis else (None, 0)
-    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given, penalty, flags=flags)[0]
+    if segments.first is not None:
+        return encode_coefficients(wanted, reduced.step, Orders(segments.first, causal), given)
+    return encode_vectors(wanted, reduced.step, causal, codec.predictor, codec.beta, given)[0]

@@ -1,0 +1,94 @@
+"""The coefficients of a segment, to and from bytes: some components first, along triangles; the others along the hierarchy.
+
+What: the first components of a point are its place on the surface, hardly its motion. A surface is rougher than its motion, so
+these are predicted best from close by: point after point along a traversal, from all parallelograms
+(`gvpipe.trajectory.spatial_neighbours.parallelogram_order`). The other components follow along the hierarchy, with weights that
+have learned from the first ones. Each segment has as many first components as take fewer bits that way.
+
+Rounding grows along a traversal. So encoder and decoder do the same sums, to the bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gvpipe.container.cursor import Cursor, pack_block, varint
+from gvpipe.foundation.arrays import Float64
+from gvpipe.foundation.elementary import log2
+from gvpipe.trajectory.causal_order import CausalOrder
+from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
+from gvpipe.trajectory.prediction import predict_vectors
+from gvpipe.trajectory.trellis import GRADES
+from gvpipe.trajectory.trellis_search import PENALTY
+
+MOST_FIRST = 8  # components
+
+
+class Orders(NamedTuple):
+    """Two orders of the points that are coded.
+
+    Args:
+        first: along a traversal.
+        causal: along the hierarchy.
+    """
+
+    first: CausalOrder
+    causal: CausalOrder
+
+
+def encode_coefficients(wanted: Float64, step: float, orders: Orders, given: Float64 | None) -> bytes:
+    """Return the bytes of ``wanted (n, R)``, residuals on a trellis.
+
+    Args:
+        wanted: coefficients of all points, model units.
+        step: D, model units.
+        orders: of the points that are coded.
+        given: ``(n, R)`` of points that the orders leave out.
+    """
+    n_first = _choose(wanted, step, orders, given)
+    if not n_first:
+        return varint(0) + encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES)[0]
+    begun = _columns(wanted, n_first), _columns(given, n_first)
+    data, known = encode_vectors(begun[0], step, orders.first, "kalman", 0.0, begun[1], PENALTY, is_exact=True)
+    rest, _ = encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES, known=known)
+    return varint(n_first) + pack_block(data) + rest
+
+
+def decode_coefficients(
+    data: bytes, n_components: int, step: float, orders: Orders, name: str, n_blocks: int | None, given: Float64 | None
+) -> Float64:
+    """Mirror of `encode_coefficients`; returns coefficients ``(n, R)`` of all points.
+
+    Args:
+        data, step, orders, given: as there.
+        n_components: R.
+        name: of the section, for messages.
+        n_blocks: as of `gvpipe.trajectory.coefficient_coding.decode_vectors`.
+
+    Raises:
+        CorruptFile: the bytes are not what it writes.
+    """
+    cursor, known = Cursor(data, name), None
+    n_first = cursor.varint(min(MOST_FIRST, n_components), "the number of first components")
+    if n_first:
+        known = decode_vectors(cursor.block(), n_first, step, orders.first, name, given=_columns(given, n_first))
+    return decode_vectors(cursor.rest(), n_components, step, orders.causal, name, n_blocks, given=given, known=known)
+
+
+def _choose(wanted: Float64, step: float, orders: Orders, given: Float64 | None) -> int:
+    """How many first components take fewest bits, about, by residuals of plain rounding."""
+    n = min(MOST_FIRST, wanted.shape[1])
+    target, bits = _columns(wanted, n), []
+    for order in orders:
+        residuals = np.zeros((len(order.order), n), np.int64)
+        start = np.zeros(target.shape) if given is None else _columns(given, n)
+        predict_vectors(order, step, residuals, start, target, "kalman", 0.0)
+        bits.append(np.cumsum(log2(1.0 + np.abs(residuals)).sum(axis=0)))
+    saved = np.concatenate([[0.0], bits[1] - bits[0]])
+    return int(np.argmax(saved))
+
+
+def _columns(vectors: Float64 | None, n: int) -> Float64 | None:
+    return None if vectors is None else np.ascontiguousarray(vectors[:, :n])
