@@ -47,7 +47,7 @@ RESIDUALS = ("gvpipe.trajectory.contexts.Residuals", [NUMBERS, NUMBERS, LONGS])
 INPUTS = ("gvpipe.trajectory.contexts.ContextInputs", [INTS] * 5 + [LONGS] * 3)
 STREAM = ("gvpipe.entropy.block_kernels.BlockStream", ["uint64[1]", "uint32[1]", "uint64[2]", LONGS])
 TRELLIS = ("gvpipe.entropy.learning_kernels.LearningStream", ["uint64[1]", "uint32[1]", NUMBERS])
-VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS, FLOATS])
+VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS, FLOATS, "float64"])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
     [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
@@ -196,6 +196,7 @@ KERNELS: dict[str, list[Any]] = {  # arguments: arrays in C order, scalars, Name
     "gvpipe.trajectory.prediction_kernels.predict_rbf": [VECTORS, SCALAR, SCALAR, "float64"],
     "gvpipe.trajectory.trellis_kernels.code_residuals": [RESIDUALS, INPUTS, TRELLIS, SCALAR, SCALAR, "bool"],
     "gvpipe.trajectory.spatial_kernels.weigh_hierarchy": [HIERARCHY, "bool"],
+    "gvpipe.trajectory.spatial_kernels.weigh_parallelograms": [TRIANGLES, SCALAR],
     "gvpipe.trajectory.spatial_kernels.weigh_traversal": [TRIANGLES, SCALAR],
     "gvpipe.trajectory.still_kernels.fit_still": [ROWS, FLOATS, ROWS],
     "gvpipe.trajectory.product_kernels.multiply": [SPARSE, ROWS],

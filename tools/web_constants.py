@@ -92,7 +92,8 @@ SHARED = {
     "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS MORE_NEIGHBOURS VARIANCE MORE_VARIANCE MIN_BLOCK "
     "CUBIC LINEAR OFFSETS",
-    "gvpipe.trajectory.trellis": "FINENESS ZEROS SHAPES GRADES FINDS_NOISES FALL LEAST_GRADE",
+    "gvpipe.trajectory.spatial_neighbours": "KEPT_PER_VERTEX KEPT_PER_TRIANGLE SECONDS_PER_VERTEX SECONDS_PER_TRIANGLE",
+    "gvpipe.trajectory.trellis": "FINENESS PARTS ZEROS SHAPES GRADES FINDS_NOISES FALL LEAST_GRADE",
     "gvcodecs.laplacian.average_coding": "NAME SPACING FARTHEST",
     "gvcodecs.laplacian.anchors": "ANCHOR_CHOICES",
     "gvcodecs.laplacian.delta_rows": "DELTA_PREDICTIONS N_CAUSAL N_RING",
@@ -115,6 +116,7 @@ SHARED = {
     "gvcodecs.mcgv.motion.weight_kernels": "MAX_LISTED",
     "gvcodecs.mcgv.pictures.trajectories": "PLANES",
     "gvcodecs.mcgv.decoding.trajectory_reader": "BYTES_PER_SAMPLE SECONDS_PER_SAMPLE",
+    "gvcodecs.pca.coefficients": "MOST_FIRST FIRST_STEP",
     "gvcodecs.pca.header": "MAX_SEGMENTS VERSION",
     "gvcodecs.pdct.clip": "MAX_CLUSTERS BYTES_PER_POINT SECONDS_PER_POINT BYTES_PER_NUMBER SECONDS_PER_FRAME",
     "gvcodecs.pdct.delta_coding": "PROBLEMS",

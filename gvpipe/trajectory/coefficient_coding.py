@@ -32,7 +32,7 @@ from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, Residuals, check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors, start_vectors
-from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, block_steps, find_noises
+from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, PARTS, block_steps, find_noises
 from gvpipe.trajectory.trellis_coding import TrellisDecoder, encode_numbers
 from gvpipe.trajectory.trellis_search import search
 
@@ -52,7 +52,7 @@ def encode_vectors(
     factor: Float64 | None = None,
     flags: int = 0,
     known: Float64 | None = None,
-    is_exact: bool = False,
+    rounds: bool = False,
 ) -> tuple[bytes, Float64]:
     """Code ``target (n, R)``; return the bytes and what the decoder will have, ``(n, R)``; on a trellis but for the last bits.
 
@@ -69,13 +69,15 @@ def encode_vectors(
         factor: how errors of the vectors add up, on a trellis (`gvpipe.trajectory.trellis_search.search`).
         flags: of a stream on a trellis (`gvpipe.trajectory.trellis`).
         known: ``(n, K)`` decoded first components of all vectors, on a trellis: the others alone are coded.
-        is_exact: as of `gvpipe.trajectory.trellis_search.search`, on a trellis.
+        rounds: as of `gvpipe.trajectory.trellis_search.search`, on a trellis.
 
     Raises:
         InputError: a value is too large for the step.
     """
     if penalty is not None:
-        return _encode_trellis(target, causal, search(target, step, causal, given, penalty, factor, flags, known, is_exact), flags)
+        return _encode_trellis(
+            target, causal, search(target, step, causal, given, penalty, factor, flags, known, rounds), flags
+        )
     from gvpipe.trajectory.context_kernels import find_all_contexts
 
     wide = np.zeros((len(causal.order), target.shape[1]), np.int64)
@@ -116,13 +118,14 @@ def decode_vectors(
     beta: float = 1.8,
     given: Float64 | None = None,
     known: Float64 | None = None,
+    rounds: bool = False,
 ) -> Float64:
     """Mirror of `encode_vectors`: ``(n, R)``.
 
     Args:
         data: the bytes.
         n_components: R.
-        step, causal, predictor, beta, given, known: as for `encode_vectors`.
+        step, causal, predictor, beta, given, known, rounds: as for `encode_vectors`.
         name: of the section, for messages.
         n_blocks: decode the first so many blocks alone, other vectors stay 0; None: all.
 
@@ -141,8 +144,8 @@ def decode_vectors(
         raise cursor.corrupt("a magnitude level is out of range")
     rest = cursor.rest()
     flags = _flags(rest)
-    if known is not None and flags is None:
-        raise cursor.corrupt("it is not on a trellis, as vectors with known components are")
+    if flags is None and (rounds or known is not None):
+        raise cursor.corrupt("its residuals are not on a trellis")
     if flags and predictor != "kalman":
         raise cursor.corrupt("its flags are those of the predictor kalman")
     coder = BlockDecoder(rest, N_CONTEXTS, name) if flags is None else TrellisDecoder(rest[1:], name)
@@ -167,7 +170,8 @@ def decode_vectors(
     for first, last in run_ahead(take, parts, len(parts), n_threads=1):  # predict while the next ones are decoded
         for b, end in pairwise([*range(first, last), last] if flags else [first, last]):
             noises = find_noises(ranked[bounds[max(0, b - 1)] : bounds[b]], steps[b], flags or 0, n_components - n_coded)
-            predict_vectors(causal, steps[b], ranked, decoded, None, predictor, beta, bounds[b], bounds[end], noises)
+            unit = steps[b] / PARTS if rounds else 0.0
+            predict_vectors(causal, steps[b], ranked, decoded, None, predictor, beta, bounds[b], bounds[end], noises, unit)
     if n_blocks is None:
         coder.end()
     return decoded

@@ -40,6 +40,7 @@ def predict_vectors(
     begin: int = 0,
     end: int | None = None,
     noises: Float64 | None = None,
+    unit: float = 0.0,
 ) -> None:
     """Code vectors (``target`` given), filling ``residuals`` and ``decoded``, or fill ``decoded`` from ``residuals``.
 
@@ -51,13 +52,14 @@ def predict_vectors(
         beta: exponent of the radial function (rbf).
         begin, end: which vectors of the order, those before ``begin`` being done; None: up to the last of ``residuals``.
         noises: ``(R,)`` of `gvpipe.trajectory.prediction_kernels.VectorCoding`; None: the squared step.
+        unit: as of the same.
     """
     from gvpipe.trajectory import kalman_kernels, prediction_kernels
 
     if noises is None:
         noises = np.full(decoded.shape[1], step * step)
     wanted = np.zeros((0, 0)) if target is None else target
-    coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, wanted, noises)
+    coding = prediction_kernels.VectorCoding(causal, step, residuals, decoded, wanted, noises, unit)
     stop = len(residuals) if end is None else end
     if predictor == "kalman":
         kalman_kernels.predict_kalman(coding, begin, stop)

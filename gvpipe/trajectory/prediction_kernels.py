@@ -32,6 +32,7 @@ class VectorCoding(NamedTuple):
         decoded: ``(n, R)`` components, by vector, in the order of transmission. Given vectors are there already.
         target: ``(n, R)`` what to code; ``(0, 0)``: decode.
         noises: ``(R,)`` variances of what no weights explain, of ``kalman``, squared units of the components.
+        unit: decoded components are rounded to its multiples, so that rounding of sums does not grow; 0: they are not.
     """
 
     causal: CausalOrder
@@ -40,6 +41,7 @@ class VectorCoding(NamedTuple):
     decoded: Float64
     target: Float64
     noises: Float64
+    unit: float
 
 
 class LeastSquares(NamedTuple):
@@ -144,6 +146,12 @@ def _predict_vector_lsp(coding: VectorCoding, i: int, fit: LeastSquares) -> None
 
 
 @inlined
+def rounded(value: float, unit: float) -> float:
+    """The multiple of a unit next to a value; the value itself if it is 0."""
+    return float(np.floor(value / unit + 0.5) * unit) if unit > 0 else value
+
+
+@inlined
 def n_known(coding: VectorCoding) -> int:
     """K, how many components of all vectors are known."""
     return int(coding.decoded.shape[1] - coding.residuals.shape[1])
@@ -163,7 +171,7 @@ def code_component(coding: VectorCoding, i: int, vector: int, c: int, guess: flo
         whole = np.floor(abs(steps) + ROUND_UP)
         coding.residuals[i, own] = whole if steps > 0 else -whole
     change: float = coding.residuals[i, own] * coding.step
-    coding.decoded[vector, c] = guess + change
+    coding.decoded[vector, c] = rounded(guess + change, coding.unit)
     return change
 
 

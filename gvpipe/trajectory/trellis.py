@@ -24,6 +24,7 @@ from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.contexts import N_CONTEXTS
 
 FINENESS = 21 / 32  # of a step
+PARTS = 16  # of a fine step, to which decoded components are rounded along orders where rounding of sums would grow
 GRADES, FINDS_NOISES = 1, 2  # flags of a stream: steps by block (`block_steps`), noises by component (`find_noises`)
 FALL, LEAST_GRADE = 0.96, 5 / 8  # of a block's step, in that of the next; in that of the last
 N_STATES, N_QUANTISERS = 8, 2

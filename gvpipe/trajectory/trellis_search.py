@@ -22,7 +22,7 @@ from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors, start_vectors
-from gvpipe.trajectory.trellis import FINENESS, block_steps, find_noises, first_tables
+from gvpipe.trajectory.trellis import FINENESS, PARTS, block_steps, find_noises, first_tables
 
 BASIS_PENALTY, PENALTY = 0.25, 0.22  # of a bit that do best: of a basis, of coefficients
 N_PRICED = 64  # magnitudes that have a price of their own
@@ -38,7 +38,7 @@ def search(
     factor: Float64 | None = None,
     flags: int = 0,
     known: Float64 | None = None,
-    is_exact: bool = False,
+    rounds: bool = False,
 ) -> tuple[Int64, Int64, Float64]:
     """Return the integers k and the residuals r, both ``(m, R - K)`` by rank, and what they decode to ``(n, R)``.
 
@@ -49,7 +49,8 @@ def search(
         factor: M ``(m, m)``, lower triangular, by rank. An error e ``(m, R)`` of the vectors counts as ``|M e|^2``, and each
             vector makes up for the errors of those before, as far as it can. None: an error counts as ``|e|^2``.
         flags: of the stream (`gvpipe.trajectory.trellis`).
-        is_exact: what vectors decode to is found as the decoder finds it, to the bit, for orders along which rounding grows.
+        rounds: decoded components are rounded to parts of the fine step, in encoder and decoder, for orders along which errors of
+            rounding would grow.
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
     from gvpipe.trajectory.prediction_kernels import VectorCoding
@@ -65,17 +66,19 @@ def search(
         noises = find_noises(plain[before:begin], own, flags, n_known)
         predict_vectors(causal, own, plain, decoded, target, "kalman", 0.0, begin, end, noises)
     check_residuals(plain)  # what follows holds for smaller ones alone
-    fine = np.rint(plain * (1 / FINENESS)).astype(np.int64)
-    check_residuals(fine)
-    inputs = context_inputs(causal, len(target), level_of(fine), len(causal.blocks) - 1)
-    contexts, numbers = find_all_contexts(fine, inputs), np.zeros(shape, np.int64)
+    ranked = np.rint(plain * (1 / FINENESS)).astype(np.int64)
+    check_residuals(ranked)
+    inputs = context_inputs(causal, len(target), level_of(ranked), len(causal.blocks) - 1)
+    contexts, numbers = find_all_contexts(ranked, inputs), np.zeros(shape, np.int64)
     weights = np.zeros((0, 0)) if factor is None else factor
     for before, begin, end, own in blocks:
         noises = find_noises(residuals[before:begin], own * FINENESS, flags, n_known)
-        coding = VectorCoding(causal, own * FINENESS, residuals, found, target, noises)
+        fine = own * FINENESS
+        unit = fine / PARTS if rounds else 0.0
+        coding = VectorCoding(causal, fine, residuals, found, target, noises, unit)
         search_paths(coding, contexts, _prices(), penalty, weights, begin, end, numbers)
-        if is_exact:
-            predict_vectors(causal, own * FINENESS, residuals, found, None, "kalman", 0.0, begin, end, noises)
+        if rounds:  # the search's sums have another order
+            predict_vectors(causal, fine, residuals, found, None, "kalman", 0.0, begin, end, noises, unit)
     return numbers, residuals, found
 
 

@@ -10,7 +10,7 @@ from gvpipe.foundation.arrays import Float64, Int64, UInt8
 from gvpipe.runtime.compiled import compiled, inlined
 from gvpipe.runtime.lanes import LANES, load, same, store
 from gvpipe.trajectory.kalman_kernels import DOUBT
-from gvpipe.trajectory.prediction_kernels import VectorCoding, most_neighbours, n_known
+from gvpipe.trajectory.prediction_kernels import VectorCoding, most_neighbours, n_known, rounded
 from gvpipe.trajectory.trellis import N_QUANTISERS, N_STATES
 from gvpipe.trajectory.trellis_kernels import next_state, residual_of
 
@@ -74,7 +74,7 @@ def search_paths(
                 _learn(n, (coding.decoded[coding.causal.order[rank], c] - paths.guesses[0]) / variance, paths)
                 continue
             _extend(aims[c], coding.step, prices[N_QUANTISERS * contexts[rank, c - known] :], penalty / weight, c, paths)
-            _update(n, c, variance, coding.step, paths)
+            _update(n, c, variance, coding, paths)
         state = 0
         for other in range(1, N_STATES):
             if paths.costs[other] < paths.costs[state] - MARGIN:
@@ -192,16 +192,16 @@ def _price(prices: Float64, number: int) -> float:
 
 
 @inlined
-def _update(n: int, c: int, variance: float, step: float, paths: Paths) -> None:
+def _update(n: int, c: int, variance: float, coding: VectorCoding, paths: Paths) -> None:
     """Take the paths to the next states: their costs, values and weights."""
     for state in range(N_STATES):
         paths.costs[state] = paths.next_costs[state]
         paths.changes[state] = 0.0
         if paths.costs[state] < NEVER:
             before = paths.before[c, state]
-            change = residual_of(paths.numbers[c, state], before) * step
+            change = residual_of(paths.numbers[c, state], before) * coding.step
             paths.changes[state] = change / variance
-            paths.values[c, state] = paths.guesses[before] + change
+            paths.values[c, state] = rounded(paths.guesses[before] + change, coding.unit)
         else:
             paths.before[c, state] = 0
     changes = load(paths.changes, 0)

@@ -36,7 +36,7 @@ def test_both_forms_of_kalman_predict_the_same(n_components: int, step: float, a
     causal = causal._replace(affine=affine)
     most = int(np.diff(causal.starts).max())
     residuals, coded, decoded = np.zeros(target.shape, np.int64), np.zeros(target.shape), np.zeros(target.shape)
-    coding = VectorCoding(causal, step, residuals, coded, target, np.full(n_components, step * step))
+    coding = VectorCoding(causal, step, residuals, coded, target, np.full(n_components, step * step), 0.0)
     predict_in_batches(coding, 0, len(target), most, True)
     predict_in_batches(coding._replace(decoded=decoded, target=np.zeros((0, 0))), 0, len(target), most, False)
     assert np.abs(residuals).max() > 10
@@ -49,7 +49,7 @@ def test_vectors_side_by_side_are_predicted_as_if_alone(step: float, are_few: bo
     causal, target = _rows(7)
     most = int(np.diff(causal.starts).max())
     residuals, coded = np.zeros(target.shape, np.int64), np.zeros(target.shape)
-    coding = VectorCoding(causal, step, residuals, coded, target, np.full(7, step * step))
+    coding = VectorCoding(causal, step, residuals, coded, target, np.full(7, step * step), 0.0)
     predict_in_batches(coding, 0, len(target), most, are_few)
     decoded = np.zeros(target.shape)
     for i in range(len(target)):

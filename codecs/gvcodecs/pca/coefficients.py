@@ -5,7 +5,7 @@ these are predicted best from close by: point after point along a traversal, fro
 (`gvpipe.trajectory.spatial_neighbours.parallelogram_order`). The other components follow along the hierarchy, with weights that
 have learned from the first ones. Each segment has as many first components as take fewer bits that way.
 
-Rounding grows along a traversal. So encoder and decoder do the same sums, to the bit.
+Along a traversal, errors of rounding would grow. So first components are rounded to parts of their step, as they are decoded.
 """
 
 from __future__ import annotations
@@ -23,7 +23,11 @@ from gvpipe.trajectory.prediction import predict_vectors
 from gvpipe.trajectory.trellis import GRADES
 from gvpipe.trajectory.trellis_search import PENALTY
 
-MOST_FIRST = 8  # components
+MOST_FIRST = 16  # components
+FIRST_STEP = (
+    0.9  # of first components, in D: as fine as steps of blocks are on average (`gvpipe.trajectory.trellis.block_steps`)
+)
+MARGIN = 0.1  # bits of a first component of a point that must be saved
 
 
 class Orders(NamedTuple):
@@ -51,7 +55,7 @@ def encode_coefficients(wanted: Float64, step: float, orders: Orders, given: Flo
     if not n_first:
         return varint(0) + encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES)[0]
     begun = _columns(wanted, n_first), _columns(given, n_first)
-    data, known = encode_vectors(begun[0], step, orders.first, "kalman", 0.0, begun[1], PENALTY, is_exact=True)
+    data, known = encode_vectors(begun[0], FIRST_STEP * step, orders.first, "kalman", 0.0, begun[1], PENALTY, rounds=True)
     rest, _ = encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES, known=known)
     return varint(n_first) + pack_block(data) + rest
 
@@ -73,7 +77,9 @@ def decode_coefficients(
     cursor, known = Cursor(data, name), None
     n_first = cursor.varint(min(MOST_FIRST, n_components), "the number of first components")
     if n_first:
-        known = decode_vectors(cursor.block(), n_first, step, orders.first, name, given=_columns(given, n_first))
+        known = decode_vectors(
+            cursor.block(), n_first, FIRST_STEP * step, orders.first, name, given=_columns(given, n_first), rounds=True
+        )
     return decode_vectors(cursor.rest(), n_components, step, orders.causal, name, n_blocks, given=given, known=known)
 
 
@@ -86,7 +92,7 @@ def _choose(wanted: Float64, step: float, orders: Orders, given: Float64 | None)
         start = np.zeros(target.shape) if given is None else _columns(given, n)
         predict_vectors(order, step, residuals, start, target, "kalman", 0.0)
         bits.append(np.cumsum(log2(1.0 + np.abs(residuals)).sum(axis=0)))
-    saved = np.concatenate([[0.0], bits[1] - bits[0]])
+    saved = np.concatenate([[0.0], bits[1] - bits[0]]) - MARGIN * len(orders.first.order) * np.arange(n + 1)
     return int(np.argmax(saved))
 
 

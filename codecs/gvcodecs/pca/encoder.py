@@ -95,7 +95,11 @@ class Pca(BaseCodec):
         causal, levels = memo("order", lambda: _order(build_hierarchy(mesh.point_faces, mesh.n_points), self.predictor))
         data, still = code_still(sequence, shared, target_error, memo)
         causal, moving = leave_out(causal, still.flags), shared.members[~still.flags]
-        first = leave_out(memo("first", lambda: parallelogram_order(mesh.point_faces, mesh.n_points)), still.flags) if self.on_trellis else None
+        first = (
+            leave_out(memo("first", lambda: parallelogram_order(mesh.point_faces, mesh.n_points)), still.flags)
+            if self.on_trellis
+            else None
+        )
         bounds = cut(sequence.n_frames, self.segment, MAX_SEGMENTS)
         n_segments = len(bounds) - 1
         sections = {"mesh": shared.coded.mesh, "order": shared.coded.order, **({SECTION: data} if data else {})}

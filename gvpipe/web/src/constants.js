@@ -337,8 +337,15 @@ export const TEMPORAL_NEIGHBOURS_CUBIC = new Map([[-3, -0.0625], [-1, 0.5625], [
 export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
 
+// gvpipe.trajectory.spatial_neighbours
+export const SPATIAL_NEIGHBOURS_KEPT_PER_VERTEX = 520;
+export const SPATIAL_NEIGHBOURS_KEPT_PER_TRIANGLE = 40;
+export const SPATIAL_NEIGHBOURS_SECONDS_PER_VERTEX = 2e-06;
+export const SPATIAL_NEIGHBOURS_SECONDS_PER_TRIANGLE = 5e-07;
+
 // gvpipe.trajectory.trellis
 export const TRELLIS_FINENESS = 0.65625;
+export const TRELLIS_PARTS = 16;
 export const TRELLIS_ZEROS = [[255, 255, 254, 252, 247, 242, 235, 224, 206, 184, 152, 118, 88, 66, 49, 35, 26, 19, 14, 10, 8, 7, 6, 5, 4, 3, 2], [255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1]];
 export const TRELLIS_SHAPES = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 6, 8, 10, 12, 14, 17, 19, 21, 23, 24, 25, 26, 27, 28, 29];
 export const TRELLIS_GRADES = 1;
@@ -441,6 +448,10 @@ export const TRAJECTORIES_PLANES = 3;
 // gvcodecs.mcgv.decoding.trajectory_reader
 export const TRAJECTORY_READER_BYTES_PER_SAMPLE = 48;
 export const TRAJECTORY_READER_SECONDS_PER_SAMPLE = 1e-07;
+
+// gvcodecs.pca.coefficients
+export const PCA_COEFFICIENTS_MOST_FIRST = 16;
+export const PCA_COEFFICIENTS_FIRST_STEP = 0.9;
 
 // gvcodecs.pca.header
 export const PCA_HEADER_MAX_SEGMENTS = 2000;

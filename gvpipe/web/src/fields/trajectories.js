@@ -45,7 +45,7 @@ function decodeCoefficients(data, count, step, { kernels, causal, name }) {
   order.forEach((row, rank) => to.set(from.subarray(row * count, (row + 1) * count), rank * count));
   const decoded = kernels.array("float64", [rows, count]);
   const noises = kernels.array("float64", [count], new Float64Array(count).fill(step * step));
-  const coding = [...causal, step, ranked, decoded, kernels.array("float64", [0, 0]), noises];
+  const coding = [...causal, step, ranked, decoded, kernels.array("float64", [0, 0]), noises, 0];
   inBlocks(rows, (first, end) => kernels.call("predict_kalman", ...coding, first, end));
   return decoded;
 }

@@ -8,10 +8,10 @@ import { inSlices } from "../format/slices.js";
 import { decodeTopology } from "../format/topology_only.js";
 import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
-import { vectorSteps } from "../trajectory/coefficient_coding.js";
-import { keepHierarchy } from "../trajectory/hierarchy_budget.js";
+import { keepHierarchy, keepParallelograms } from "../trajectory/hierarchy_budget.js";
 import { Segment } from "../trajectory/segment.js";
 import { SECTION as STILL, readStill } from "../trajectory/still_points.js";
+import { coefficientSteps } from "./coefficients.js";
 import { VERSION, readHeader } from "./header.js";
 
 export { VERSION };
@@ -27,6 +27,7 @@ export class PcaReader {
   #hierarchy; // {order, blocks, waves}
   #still;
   #causal;
+  #first; // the order of first components, or null
   #segments = new Map(); // "segment level" -> Job, the one used last at the end
 
   /**
@@ -57,6 +58,10 @@ export class PcaReader {
     this.#still = readStill(kernels, still, pointFaces, pointCount, payload.budget);
     const all = kernels.call("weigh_hierarchy", ...hierarchy, header.predictor === "kalman");
     this.#causal = taken(kernels, this.#leaveOut(all));
+    this.#first = null;
+    if (!header.hasFirst) return;
+    keepParallelograms(payload.budget, pointCount, pointFaces.length / 3);
+    this.#first = taken(kernels, this.#leaveOut(kernels.call("weigh_parallelograms", this.#mesh, pointCount)));
   }
 
   /** `Uint32Array` (T, 3): triangles of level 0, flat. */
@@ -143,9 +148,9 @@ export class PcaReader {
     const basis = decodeBasis(kernels, sections[0], frameCount, this.#still.movingCount, steps[s], `basis.${s}`, 3, budget);
     const isReversed = predictor === "lsp"; // the small ones come first
     const given = this.#given(kernels, basis, isReversed);
-    const causal = placed(kernels, this.#causal);
+    const orders = [this.#first, this.#causal].map((order) => order && placed(kernels, order));
     const how = { predictor, beta, given, blocks: level ? this.#countBlocks(level) : null };
-    const vectors = vectorSteps(kernels, causal, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
+    const vectors = coefficientSteps(kernels, orders, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
     const decoded = await inSlices(vectors, () => !job.isUrgent && this.#isUrgent);
     const chosen = level ? this.#alive(level) : null;
     return new Segment(this.#kernels.fresh(), basis, kernels.view(decoded), this.#topology.pointCount, isReversed, { chosen });

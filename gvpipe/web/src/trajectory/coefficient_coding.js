@@ -14,6 +14,7 @@ import {
   TRELLIS_FINENESS as FINENESS,
   TRELLIS_GRADES as GRADES,
   TRELLIS_LEAST_GRADE as LEAST_GRADE,
+  TRELLIS_PARTS as PARTS,
 } from "../constants.js";
 import { BlockStream } from "../format/block_stream.js";
 import { Cursor } from "../format/cursor.js";
@@ -34,8 +35,9 @@ let tables = null; // made when first needed
  * @param {(import("../wasm/kernels.js").KernelArray|boolean)[]} causal the order, as kernels take it
  * @param {Uint8Array} data @param {number} components R @param {number} step quantisation step
  * @param {string} name of the section, for messages
- * @param {{predictor?: string, beta?: number, given?: import("../wasm/kernels.js").KernelArray|null, blocks?: number|null}} [how]
- *   `given` (n, R) has decoded vectors that `causal` leaves out, and is filled; `blocks` are decoded alone
+ * @param {{predictor?: string, beta?: number, given?: import("../wasm/kernels.js").KernelArray|null, blocks?: number|null, known?: number, rounds?: boolean}} [how]
+ *   `given` (n, R) has decoded vectors that `causal` leaves out, and the first `known` components of all, and is filled; `blocks` are
+ *   decoded alone; `rounds`: components to parts of their step
  * @returns {import("../wasm/kernels.js").KernelArray} (n, R) float64, by vector
  * @throws {GeometryVideoError} the bytes are not as gvpipe writes them
  */
@@ -44,15 +46,16 @@ export function decodeVectors(...given) {
 }
 
 /** `decodeVectors` in steps of some 20 ms, so that other work may come between. @yields after a step */
-export function* vectorSteps(kernels, causal, data, components, step, name, { predictor = "kalman", beta = 0, given = null, blocks = null } = {}) {
+export function* vectorSteps(kernels, causal, data, components, step, name, { predictor = "kalman", beta = 0, given = null, blocks = null, known = 0, rounds = false } = {}) {
   const cursor = new Cursor(data, name);
   const [order, , , , , , bounds] = causal;
   const n = order.shape[0];
   if (n * components > MAX_VALUES) throw cursor.corrupt(`${n} vectors of ${components} components`);
   tables ??= makeTables();
-  const levels = decodeIntegers(cursor.block(), components, null, name);
-  const usual = new BigInt64Array(components); // mean magnitudes
-  for (let c = 0, level = 0; c < components; c++) {
+  const coded = components - known;
+  const levels = decodeIntegers(cursor.block(), coded, null, name);
+  const usual = new BigInt64Array(coded); // mean magnitudes
+  for (let c = 0, level = 0; c < coded; c++) {
     level += levels[c];
     if (level < 0 || level > MAX_LEVEL) throw cursor.corrupt("a magnitude level is out of range");
     usual[c] = tables.levels[level];
@@ -60,17 +63,18 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const rest = cursor.rest();
   const flags = flagsOf(rest);
   const onTrellis = flags !== null;
+  if ((known || rounds) && !onTrellis) throw cursor.corrupt("its residuals are not on a trellis");
   if (flags && predictor !== "kalman") throw cursor.corrupt("its flags are those of the predictor kalman");
-  if (onTrellis && rest.length === 1 && n * components > 0) throw cursor.corrupt("it has no words");
+  if (onTrellis && rest.length === 1 && n * coded > 0) throw cursor.corrupt("it has no words");
   const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const wanted = blocks ?? bounds.shape[0] - 1;
   const decoded = given ?? kernels.array("float64", [n, components]);
   const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
   const vectors = kernels.view(bounds)[wanted];
-  const residuals = kernels.array("int64", [vectors, components]);
-  const known = [residuals, kernels.array("int64", [components, vectors]), kernels.array("int64", [components], usual)];
+  const residuals = kernels.array("int64", [vectors, coded]);
+  const state = [residuals, kernels.array("int64", [coded, vectors]), kernels.array("int64", [coded], usual)];
   for (let b = 0; b < wanted; b++) {
-    const given = [...known, ...inputs, ...stream.arrays, b, b + 1];
+    const given = [...state, ...inputs, ...stream.arrays, b, b + 1];
     stream.check((onTrellis ? kernels.call("code_residuals", ...given, false) : kernels.call("decode_residuals", ...given))[0]);
     yield;
   }
@@ -82,11 +86,11 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const steps = stepsOf(fine, bounds.shape[0] - 1, flags);
   for (const [first, end, before] of flags ? runs(kernels.view(bounds), wanted) : [[0, vectors, 0]]) {
     const own = flags ? steps.shift() : fine;
-    kernels.view(noises).set(noisesOf(kernels, residuals, [before, first], own, flags));
-    const coding = [...causal, own, residuals, decoded, target, noises];
+    kernels.view(noises).set(noisesOf(kernels, residuals, [before, first], own, flags, known));
+    const coding = [...causal, own, residuals, decoded, target, noises, rounds ? own / PARTS : 0];
     yield* blockSteps(first, end, (from, to) => kernels.call(`predict_${predictor}`, ...coding, from, to, ...last));
   }
-  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...known, target, noises);
+  kernels.free(...inputs.filter((array) => !causal.includes(array)), ...stream.arrays, ...state, target, noises);
   return decoded;
 }
 
@@ -115,18 +119,19 @@ function stepsOf(step, blocks, flags) {
 }
 
 /** Variances of what weights do not explain, from the residuals of the block before. Mirrors `gvpipe.trajectory.trellis.find_noises`. */
-function noisesOf(kernels, residuals, [before, first], step, flags) {
+function noisesOf(kernels, residuals, [before, first], step, flags, known) {
   const components = residuals.shape[1];
-  const noises = new Float64Array(components).fill(step * step);
+  const noises = new Float64Array(known + components).fill(step * step);
   if (!(flags & FINDS_NOISES) || before === first) return noises;
   const words = kernels.words(residuals); // little-endian halves of int64
   const sums = new Float64Array(components);
   for (let i = 2 * before * components, c = 0; i < 2 * first * components; i += 2, c = (c + 1) % components)
     sums[c] += Math.abs(words[i + 1] * 2 ** 32 + (words[i] >>> 0));
-  return noises.map((noise, c) => {
+  for (let c = 0; c < components; c++) {
     const mean = sums[c] / (first - before) / 4;
-    return noise * (1 + mean * mean);
-  });
+    noises[known + c] *= 1 + mean * mean;
+  }
+  return noises;
 }
 
 /**
