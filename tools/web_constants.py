@@ -92,7 +92,7 @@ SHARED = {
     "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS MORE_NEIGHBOURS VARIANCE MORE_VARIANCE MIN_BLOCK "
     "CUBIC LINEAR OFFSETS",
-    "gvpipe.trajectory.spatial_neighbours": "KEPT_PER_VERTEX KEPT_PER_TRIANGLE SECONDS_PER_VERTEX SECONDS_PER_TRIANGLE",
+    "gvpipe.trajectory.spatial_neighbours": "PEAK_PER_VERTEX PEAK_PER_TRIANGLE SECONDS_PER_VERTEX SECONDS_PER_TRIANGLE",
     "gvpipe.trajectory.trellis": "FINENESS PARTS ZEROS SHAPES GRADES FINDS_NOISES FALL LEAST_GRADE",
     "gvcodecs.laplacian.average_coding": "NAME SPACING FARTHEST",
     "gvcodecs.laplacian.anchors": "ANCHOR_CHOICES",

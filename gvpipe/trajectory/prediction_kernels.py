@@ -17,6 +17,7 @@ from gvpipe.trajectory.causal_order import CausalOrder
 ROUND_UP = 0.42  # added before a residual's magnitude is cut to whole steps: 0.5 would cost 1.5 % more at equal error
 RIDGE, COARSE_RIDGE = 4.0, 64.0  # of lsp, in squared steps: draws weights that are left open to the prior ones
 NUGGET = 16  # of rbf, in units of step**beta: what quantisation adds to the radial function between two vectors
+OFFSET = 0.41421356  # instead of a half, in rounding to a unit: averages of few multiples often lie half way
 EVERY = 4  # rbf's weights are solved for each of the first components, then for every fourth: distances hardly change
 FIRST = 12
 
@@ -147,8 +148,8 @@ def _predict_vector_lsp(coding: VectorCoding, i: int, fit: LeastSquares) -> None
 
 @inlined
 def rounded(value: float, unit: float) -> float:
-    """The multiple of a unit next to a value; the value itself if it is 0."""
-    return float(np.floor(value / unit + 0.5) * unit) if unit > 0 else value
+    """The multiple of a unit near a value; the value itself if it is 0."""
+    return float(np.floor(value / unit + OFFSET) * unit) if unit > 0 else value
 
 
 @inlined

@@ -21,7 +21,7 @@ from gvpipe.foundation.budget import Budget
 from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 
-KEPT_PER_VERTEX, KEPT_PER_TRIANGLE = 520, 40  # bytes, of `parallelogram_order`
+PEAK_PER_VERTEX, PEAK_PER_TRIANGLE = 520, 40  # bytes, of `parallelogram_order`
 SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 2e-6, 0.5e-6
 
 if TYPE_CHECKING:
@@ -44,11 +44,11 @@ def hierarchy_order(hierarchy: Hierarchy, overshoots: bool = True) -> CausalOrde
     return join_order(hierarchy, weights, variances)
 
 
-def keep_parallelograms(budget: Budget, n_vertices: int, n_triangles: int) -> None:
+def ask_parallelograms(budget: Budget, n_vertices: int, n_triangles: int) -> None:
     """Check that a file may take the memory and work of `parallelogram_order`; raises `OverBudget`."""
     what = f"a traversal of {n_vertices} vertices and {n_triangles} triangles"
     seconds = SECONDS_PER_VERTEX * n_vertices + SECONDS_PER_TRIANGLE * n_triangles
-    budget.keep(what, KEPT_PER_VERTEX * n_vertices + KEPT_PER_TRIANGLE * n_triangles, seconds)
+    budget.ask(what, PEAK_PER_VERTEX * n_vertices + PEAK_PER_TRIANGLE * n_triangles, seconds)
 
 
 def traversal_order(faces: Int32, n_vertices: int) -> CausalOrder:

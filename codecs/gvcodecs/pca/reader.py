@@ -22,7 +22,7 @@ from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coefficient_coding import decode_vectors
 from gvpipe.trajectory.reconstruction import Segment, read_frames
-from gvpipe.trajectory.spatial_neighbours import hierarchy_order, keep_parallelograms, parallelogram_order
+from gvpipe.trajectory.spatial_neighbours import ask_parallelograms, hierarchy_order, parallelogram_order
 from gvpipe.trajectory.still_points import read_still
 
 if TYPE_CHECKING:
@@ -45,7 +45,6 @@ class PcaReader:
         self._mesh, self._hierarchy, order = _read_connectivity(bitstream, self._header.predictor)
         self._still = read_still(bitstream, self._mesh)
         self._causal = leave_out(order, self._still.flags)
-        self._orders = Orders(self._first_order(), self._causal) if self._header.has_first else None
         self._bounds = segment_starts(bitstream.n_frames, self._header.segments)
         self._kept: tuple[tuple[int, int], Segment] | None = None  # segment and level, which has its own points alone
 
@@ -109,8 +108,10 @@ class PcaReader:
                 given = np.ascontiguousarray(given[:, ::-1])
             data, n_components = self._bitstream.section(name), basis.vectors.shape[1]
             n_blocks = self._count_blocks(lod) if lod else None
-            if self._orders is not None:
-                coefficients = decode_coefficients(data, n_components, step, self._orders, name, n_blocks, given)
+            if self._header.has_first:
+                orders = Orders(self._first_order(), self._causal)
+                coefficients = decode_coefficients(data, n_components, step, orders, name, n_blocks, given)
+                del orders  # what follows takes memory, too
             else:
                 how = self._header.predictor, self._header.beta, given
                 coefficients = decode_vectors(data, n_components, step, self._causal, name, n_blocks, *how)
@@ -122,9 +123,9 @@ class PcaReader:
         return self._kept[1]
 
     def _first_order(self) -> CausalOrder:
-        """The order of first components (`gvcodecs.pca.coefficients`)."""
+        """The order of first components (`gvcodecs.pca.coefficients`), for one segment: it takes as much as the hierarchy."""
         n_points, faces = self._mesh.n_points, self._mesh.point_faces
-        keep_parallelograms(self._bitstream.budget, n_points, len(faces))
+        ask_parallelograms(self._bitstream.budget, n_points, len(faces))
         return leave_out(parallelogram_order(faces, n_points), self._still.flags)
 
     def _count_blocks(self, lod: int) -> int:

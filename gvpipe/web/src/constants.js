@@ -338,8 +338,8 @@ export const TEMPORAL_NEIGHBOURS_LINEAR = new Map([[-1, 0.5], [1, 0.5]]);
 export const TEMPORAL_NEIGHBOURS_OFFSETS = [-1, 1, -3, 3, -2, -5, 5, -4];
 
 // gvpipe.trajectory.spatial_neighbours
-export const SPATIAL_NEIGHBOURS_KEPT_PER_VERTEX = 520;
-export const SPATIAL_NEIGHBOURS_KEPT_PER_TRIANGLE = 40;
+export const SPATIAL_NEIGHBOURS_PEAK_PER_VERTEX = 520;
+export const SPATIAL_NEIGHBOURS_PEAK_PER_TRIANGLE = 40;
 export const SPATIAL_NEIGHBOURS_SECONDS_PER_VERTEX = 2e-06;
 export const SPATIAL_NEIGHBOURS_SECONDS_PER_TRIANGLE = 5e-07;
 

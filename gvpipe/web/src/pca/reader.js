@@ -8,7 +8,7 @@ import { inSlices } from "../format/slices.js";
 import { decodeTopology } from "../format/topology_only.js";
 import { decodeBasis, splitBasis } from "../trajectory/basis.js";
 import { placed, taken } from "../trajectory/causal_order.js";
-import { keepHierarchy, keepParallelograms } from "../trajectory/hierarchy_budget.js";
+import { askParallelograms, keepHierarchy } from "../trajectory/hierarchy_budget.js";
 import { Segment } from "../trajectory/segment.js";
 import { SECTION as STILL, readStill } from "../trajectory/still_points.js";
 import { coefficientSteps } from "./coefficients.js";
@@ -27,7 +27,6 @@ export class PcaReader {
   #hierarchy; // {order, blocks, waves}
   #still;
   #causal;
-  #first; // the order of first components, or null
   #segments = new Map(); // "segment level" -> Job, the one used last at the end
 
   /**
@@ -57,11 +56,7 @@ export class PcaReader {
     this.#hierarchy = { order, blocks, waves };
     this.#still = readStill(kernels, still, pointFaces, pointCount, payload.budget);
     const all = kernels.call("weigh_hierarchy", ...hierarchy, header.predictor === "kalman");
-    this.#causal = taken(kernels, this.#leaveOut(all));
-    this.#first = null;
-    if (!header.hasFirst) return;
-    keepParallelograms(payload.budget, pointCount, pointFaces.length / 3);
-    this.#first = taken(kernels, this.#leaveOut(kernels.call("weigh_parallelograms", this.#mesh, pointCount)));
+    this.#causal = taken(kernels, this.#leaveOut(kernels, all));
   }
 
   /** `Uint32Array` (T, 3): triangles of level 0, flat. */
@@ -148,7 +143,7 @@ export class PcaReader {
     const basis = decodeBasis(kernels, sections[0], frameCount, this.#still.movingCount, steps[s], `basis.${s}`, 3, budget);
     const isReversed = predictor === "lsp"; // the small ones come first
     const given = this.#given(kernels, basis, isReversed);
-    const orders = [this.#first, this.#causal].map((order) => order && placed(kernels, order));
+    const orders = [this.#header.hasFirst ? this.#firstOrder(kernels) : null, placed(kernels, this.#causal)];
     const how = { predictor, beta, given, blocks: level ? this.#countBlocks(level) : null };
     const vectors = coefficientSteps(kernels, orders, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
     const decoded = await inSlices(vectors, () => !job.isUrgent && this.#isUrgent);
@@ -178,11 +173,19 @@ export class PcaReader {
     return order.slice(0, blocks.at(-1 - level)).sort();
   }
 
+  /** The order of first components, for one segment: it takes as much as the hierarchy. */
+  #firstOrder(kernels) {
+    const { pointFaces, pointCount } = this.#topology;
+    askParallelograms(this.#payload.budget, pointCount, pointFaces.length / 3);
+    const mesh = kernels.array("int32", [pointFaces.length / 3, 3], pointFaces);
+    return this.#leaveOut(kernels, kernels.call("weigh_parallelograms", mesh, pointCount));
+  }
+
   /** The order without the points that stand still. */
-  #leaveOut(causal) {
+  #leaveOut(kernels, causal) {
     if (!this.#still.count) return causal;
     const { flags } = this.#still;
-    const keep = Uint8Array.from(this.#kernels.view(causal[0]), (point) => 1 - flags[point]);
-    return this.#kernels.call("keep_ranks", ...causal, this.#kernels.array("bool", [keep.length], keep));
+    const keep = Uint8Array.from(kernels.view(causal[0]), (point) => 1 - flags[point]);
+    return kernels.call("keep_ranks", ...causal, kernels.array("bool", [keep.length], keep));
   }
 }

@@ -7,22 +7,22 @@ import {
   HIERARCHY_PEAK_PER_VERTEX as PEAK_PER_VERTEX,
   HIERARCHY_SECONDS_PER_TRIANGLE as SECONDS_PER_TRIANGLE,
   HIERARCHY_SECONDS_PER_VERTEX as SECONDS_PER_VERTEX,
-  SPATIAL_NEIGHBOURS_KEPT_PER_TRIANGLE as TRAVERSED_PER_TRIANGLE,
-  SPATIAL_NEIGHBOURS_KEPT_PER_VERTEX as TRAVERSED_PER_VERTEX,
+  SPATIAL_NEIGHBOURS_PEAK_PER_TRIANGLE as TRAVERSED_PER_TRIANGLE,
+  SPATIAL_NEIGHBOURS_PEAK_PER_VERTEX as TRAVERSED_PER_VERTEX,
   SPATIAL_NEIGHBOURS_SECONDS_PER_TRIANGLE as TRAVERSAL_SECONDS_PER_TRIANGLE,
   SPATIAL_NEIGHBOURS_SECONDS_PER_VERTEX as TRAVERSAL_SECONDS_PER_VERTEX,
 } from "../constants.js";
 
 /**
- * Of the order along a traversal. Mirrors `gvpipe.trajectory.spatial_neighbours.keep_parallelograms`.
+ * Of the order along a traversal. Mirrors `gvpipe.trajectory.spatial_neighbours.ask_parallelograms`.
  *
  * @param {import("../format/budget.js").Budget} budget @param {number} vertices @param {number} triangles
  * @throws {GeometryVideoError} the file may not take it
  */
-export function keepParallelograms(budget, vertices, triangles) {
+export function askParallelograms(budget, vertices, triangles) {
   const memory = TRAVERSED_PER_VERTEX * vertices + TRAVERSED_PER_TRIANGLE * triangles;
   const seconds = TRAVERSAL_SECONDS_PER_VERTEX * vertices + TRAVERSAL_SECONDS_PER_TRIANGLE * triangles;
-  budget.keep(`a traversal of ${vertices} vertices and ${triangles} triangles`, memory, seconds);
+  budget.ask(`a traversal of ${vertices} vertices and ${triangles} triangles`, memory, seconds);
 }
 
 /**
