@@ -42,6 +42,8 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "mcgv-1-predicted": ("mcgv", {"placement": "halves"}),
     "mcgv-1-trellis": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
     "mcgv-1-still": ("mcgv", {"gop": 5, "segment": 7, "placement": "tiles"}),
+    "pca-1-first": ("pca", {"quality": 85}),
+    "pca-1-first-still": ("pca", {"quality": 90, "segment": 9}),
     "pca-1-graded": ("pca", {"quality": 90}),
     "pca-1-graded-still": ("pca", {"quality": 95}),
     "pca-1-kalman": ("pca", {"quantiser": "plain", "segment": 7}),
