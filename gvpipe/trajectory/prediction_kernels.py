@@ -28,8 +28,8 @@ class VectorCoding(NamedTuple):
     Args:
         causal: the order.
         step: quantisation step of every component.
-        residuals: ``(m, R - K)`` of the first m vectors of the order, in steps. The first K components of all vectors are known:
-            they are in ``decoded``, and say more about the weights of the others.
+        residuals: ``(m, R - K)`` of the first m vectors of the order, in steps. K components of all vectors are known, the
+            first in ``decoded``, and say more about the weights of the others.
         decoded: ``(n, R)`` components, by vector, in the order of transmission. Given vectors are there already.
         target: ``(n, R)`` what to code; ``(0, 0)``: decode.
         noises: ``(R,)`` variances of what no weights explain, of ``kalman``, squared units of the components.

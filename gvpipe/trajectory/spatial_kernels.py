@@ -169,7 +169,7 @@ def _average_parallelograms(
 
 @compiled
 def _append(vertex: int, rank: int, ranks: Int32, places: Int32, near: Int32, n: int) -> int:
-    """Append a vertex to the first n of ``near`` if it comes before ``rank``, is new and finds room; return how many there are."""
+    """Append a vertex to the first n of ``near`` if it is before ``rank``, new, and finds room; return how many there are."""
     if n < MOST_CAUSAL and ranks[vertex] < rank and places[vertex] < 0:
         near[n], places[vertex] = vertex, n
         n += 1

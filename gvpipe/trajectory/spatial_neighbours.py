@@ -63,11 +63,12 @@ def traversal_order(faces: Int32, n_vertices: int) -> CausalOrder:
 
 
 def parallelogram_order(faces: Int32, n_vertices: int) -> CausalOrder:
-    """Return the order of V vertices along a traversal of ``faces (T, 3)``, each predicted from all parallelograms that it ends.
+    """Return the order of V vertices along a traversal of ``faces (T, 3)``, predicted from all parallelograms that they end.
 
     For the components that are the shape itself, which is rough: all triangles are short here, a hierarchy's are not. Weights
-    start from the average of the parallelograms, a little of it the ring's average, as in D. Cohen-Or, R. Cohen and R. Irony,
-    "Multi-way Geometry Encoding", 2002, but for that part.
+    start from the average of the parallelograms, a part of it the ring's average.
+
+    Source: D. Cohen-Or, R. Cohen and R. Irony, "Multi-way Geometry Encoding", 2002; the ring's part is a departure.
     """
     from gvpipe.trajectory.spatial_kernels import weigh_parallelograms
 

@@ -49,8 +49,8 @@ def search(
         factor: M ``(m, m)``, lower triangular, by rank. An error e ``(m, R)`` of the vectors counts as ``|M e|^2``, and each
             vector makes up for the errors of those before, as far as it can. None: an error counts as ``|e|^2``.
         flags: of the stream (`gvpipe.trajectory.trellis`).
-        rounds: decoded components are rounded to parts of the fine step, in encoder and decoder, for orders along which errors of
-            rounding would grow.
+        rounds: decoded components are rounded to parts of the fine step, by the decoder, too: for orders along which errors
+            of sums would grow.
     """
     from gvpipe.trajectory.context_kernels import find_all_contexts
     from gvpipe.trajectory.prediction_kernels import VectorCoding

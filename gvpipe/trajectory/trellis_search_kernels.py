@@ -54,7 +54,7 @@ class Paths(NamedTuple):
 def search_paths(
     coding: VectorCoding, contexts: UInt8, prices: Float64, penalty: float, factor: Float64, begin: int, end: int, found: Int64
 ) -> None:
-    """Fill ``coding.residuals (m, R - K)``, ``coding.decoded``, ``found (m, R - K)``, the integers k, of ranks ``begin`` to ``end``.
+    """Fill ``coding.residuals`` and ``found``, ``(m, R - K)`` integers k, and ``coding.decoded`` of ranks ``begin`` to ``end``.
 
     Args:
         coding: ``step`` is the fine one.
