@@ -17,6 +17,7 @@ from shapes import ball
 
 from gvbaselines.awc import analyse, find_wavelets, norms, ring_weights, synthesise
 from gvbaselines.baseline import Baseline
+from gvbaselines.famc import LADDER, START, find_count
 from gvbaselines.rlpca import localised, placed
 from gvbaselines.square_map import map_to_square
 from gvbaselines.tls import join, levels_of, split
@@ -225,3 +226,17 @@ def test_local_frames_take_rigid_motion_out() -> None:
     local = localised(frames, origins, axes)
     assert np.allclose(local.reshape(len(points), 30, 3), local.reshape(len(points), 30, 3)[:, :1])
     assert np.allclose(placed(local, origins, axes), frames)
+
+
+@pytest.mark.parametrize("least", LADDER)
+def test_a_search_finds_the_number_of_clusters(least: int) -> None:
+    asked: list[int] = []
+
+    def size(n: int) -> int:
+        asked.append(n)
+        return abs(LADDER.index(n) - LADDER.index(least))
+
+    assert find_count(size) == least
+    assert asked[0] in (START, LADDER[LADDER.index(START) - 1])
+    assert len(set(asked)) == len(asked) <= 3 + abs(LADDER.index(least) - LADDER.index(START))
+    assert find_count(lambda n: 7) == START
