@@ -156,7 +156,7 @@ def _fit_on_base(
 
 
 def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrials:
-    """Trials of another blend on the same base frame, fitted from a step on for a target error (0: for the step), model units."""
+    """Trials of another blend on the same base frame, fitted from a step on for an error (0: for the step), model units."""
     start = dataclasses.replace(trials.candidate.start, step=step)
     return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error, trials.candidate.fitted)[0]))
 
