@@ -19,7 +19,7 @@ from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
-from gvpipe.trajectory.prediction import predict_vectors
+from gvpipe.trajectory.prediction import predict_vectors, start_vectors
 from gvpipe.trajectory.trellis import GRADES
 from gvpipe.trajectory.trellis_search import PENALTY
 
@@ -54,7 +54,7 @@ def encode_coefficients(wanted: Float64, step: float, orders: Orders, given: Flo
     n_first = _choose(wanted, step, orders, given)
     if not n_first:
         return varint(0) + encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES)[0]
-    begun = _columns(wanted, n_first), _columns(given, n_first)
+    begun = _columns(wanted, n_first), _given(given, n_first)
     data, known = encode_vectors(begun[0], FIRST_STEP * step, orders.first, "kalman", 0.0, begun[1], PENALTY, rounds=True)
     rest, _ = encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES, known=known)
     return varint(n_first) + pack_block(data) + rest
@@ -78,7 +78,7 @@ def decode_coefficients(
     n_first = cursor.varint(min(MOST_FIRST, n_components), "the number of first components")
     if n_first:
         known = decode_vectors(
-            cursor.block(), n_first, FIRST_STEP * step, orders.first, name, given=_columns(given, n_first), rounds=True
+            cursor.block(), n_first, FIRST_STEP * step, orders.first, name, given=_given(given, n_first), rounds=True
         )
     return decode_vectors(cursor.rest(), n_components, step, orders.causal, name, n_blocks, given=given, known=known)
 
@@ -88,13 +88,16 @@ def _choose(wanted: Float64, step: float, orders: Orders, given: Float64 | None)
     n = min(MOST_FIRST, wanted.shape[1])
     target, bits = _columns(wanted, n), []
     for order in orders:
-        residuals = np.zeros((len(order.order), n), np.int64)
-        start = np.zeros(target.shape) if given is None else _columns(given, n)
-        predict_vectors(order, step, residuals, start, target, "kalman", 0.0)
+        residuals, decoded = np.zeros((len(order.order), n), np.int64), start_vectors(target.shape, _given(given, n), None)
+        predict_vectors(order, step, residuals, decoded, target, "kalman", 0.0)
         bits.append(np.cumsum(log2(1.0 + np.abs(residuals)).sum(axis=0)))
     saved = np.concatenate([[0.0], bits[1] - bits[0]]) - MARGIN * len(orders.first.order) * np.arange(n + 1)
     return int(np.argmax(saved))
 
 
-def _columns(vectors: Float64 | None, n: int) -> Float64 | None:
-    return None if vectors is None else np.ascontiguousarray(vectors[:, :n])
+def _columns(vectors: Float64, n: int) -> Float64:
+    return np.ascontiguousarray(vectors[:, :n])
+
+
+def _given(vectors: Float64 | None, n: int) -> Float64 | None:
+    return None if vectors is None else _columns(vectors, n)
