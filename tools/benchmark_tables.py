@@ -54,8 +54,8 @@ NAMES = {
 SYSTEMS = (
     *("mcgv", "mcgv:prediction=affine", "mcgv:prediction=affine:image=jpeg", "pca", "laplacian", "pdct"),
     *("pca:predictor=rbf", "pca:predictor=navg", "laplacian:operator=mean-value:delta_prediction=rigid", "pdct:clusters=40"),
-    *("afxic", "coddyac", "cpca", "d3dmc", "dynapack", "dynapack:predictor=replica", "dynapack:predictor=space"),
-    *("famc", "gv", "gv:prediction=none", "kglpc", "kglpc:taps=0", "maverg", "pcaanim", "rt"),
+    *("afxic", "awc", "coddyac", "cpca", "d3dmc", "dynapack", "dynapack:predictor=replica", "dynapack:predictor=space"),
+    *("famc", "gv", "gv:prediction=none", "kglpc", "kglpc:taps=0", "maverg", "pcaanim", "rlpca", "rt", "tls"),
 )  # codecs of docs/reproduction.md
 SCALES = ("mcgv", "mcgv-affine", "pca", "laplacian", "pdct")  # files of scale/
 COSTS = {"encode_cpu_s": "encode", "decode_cpu_s": "decode"}

@@ -7,13 +7,11 @@ Sattler, Sarlette and Klein, "Simple and Efficient Compression of Animation Sequ
 2. A vertex is its cluster and its coefficients there.
 
     segment = [float64] step, [varint] clusters K, [varint] length, labels [integers]: differences; then of each cluster
-              basis, coefficients [columns]
-    basis   = [varint] components R, [R x int16] scales, mean [columns]: differences in time, vectors [columns]
+              [varint] length, basis (`plain_basis`), coefficients [columns]
 
 Readings: the paper starts from random clusters, and names that a drawback; here they start from the trajectories farthest from
 each other, so that results repeat. It takes one number of components for all clusters; here as many as pay at one step, which
-takes fewer bytes. A principal trajectory is scaled by 2 ** (scale / 8), about the square root of its energy, and rounded to the
-step as coefficients are. Bases are not predicted in time, as COBRA did it four years later. ``basis=predicted`` codes
+takes fewer bytes. Bases are not predicted in time, as COBRA did it four years later. ``basis=predicted`` codes
 them as gvpipe does (`gvpipe.trajectory.basis`), which takes far less where there are many frames.
 """
 
@@ -27,6 +25,7 @@ from scipy.linalg import eigh
 
 from gvbaselines.baseline import Baseline
 from gvbaselines.numbers import STEP, decode_columns, decode_labels, encode_columns, multiples, quantise, read_step
+from gvbaselines.plain_basis import decode_plain, encode_plain
 from gvpipe.coding.codec import Memo
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, pack_block, varint
@@ -34,8 +33,6 @@ from gvpipe.container.json_object import JsonObject
 from gvpipe.entropy.integers import encode_integers
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.basis import (
-    Basis,
-    Principal,
     count_components,
     decode_basis,
     encode_basis,
@@ -45,7 +42,6 @@ from gvpipe.trajectory.basis import (
 from gvpipe.trajectory.gram import is_tall, smaller_gram
 
 MAX_CLUSTERS = 256
-MAX_SCALE, PER_OCTAVE = 8 * 120, 8
 PLAIN = "plain"
 BASES = (PLAIN, "predicted")
 ROUNDS = 12  # of Lloyd's algorithm
@@ -87,7 +83,7 @@ class ClusteredPca(Baseline):
             own = trajectories[labels == k]
             principal = find_principal(own, error * error * own.size)
             kept = count_components(principal, len(own), step)
-            data, basis = (_encode_plain if self.basis == PLAIN else encode_basis)(principal, kept, len(own), step)
+            data, basis = (encode_plain if self.basis == PLAIN else encode_basis)(principal, kept, len(own), step)
             parts += [pack_block(data), encode_columns(quantise(fit_coefficients(own, basis), step))]
         return b"".join(parts)
 
@@ -104,7 +100,7 @@ class ClusteredPca(Baseline):
                 raise cursor.corrupt("a cluster is empty")
             block = cursor.block()
             if settings.choice("basis", BASES) == PLAIN:
-                basis = _decode_plain(Cursor(block, cursor.name), n_frames, len(members), step)
+                basis = decode_plain(Cursor(block, cursor.name), n_frames, len(members), step)
             else:
                 Cursor(block, cursor.name).varint(min(len(members), 3 * n_frames), "the number of components")
                 basis = decode_basis(block, n_frames, len(members), step, cursor.name)
@@ -112,33 +108,6 @@ class ClusteredPca(Baseline):
             trajectories[members] = basis.mean + coefficients @ basis.vectors.T
         cursor.end()
         return np.ascontiguousarray(trajectories.reshape(mesh.n_points, n_frames, 3).swapaxes(0, 1))
-
-
-def _encode_plain(principal: Principal, kept: int, n_points: int, step: float) -> tuple[bytes, Basis]:
-    """Code the mean and the first principal trajectories of a cluster, each number by itself."""
-    scales = np.rint(PER_OCTAVE * np.log2(np.sqrt(principal.energies[:kept]))).astype(np.int64)
-    scales = np.clip(scales, -MAX_SCALE, MAX_SCALE)
-    mean = quantise(principal.mean * np.sqrt(n_points), step).reshape(-1, 3)
-    vectors = quantise(principal.vectors[:, :kept] * 2.0 ** (scales / PER_OCTAVE), step)
-    head = varint(kept) + scales.astype("<i2").tobytes()
-    data = head + encode_columns(np.diff(mean, axis=0, prepend=0)) + encode_columns(vectors)
-    return data, _scaled(mean, vectors, scales, n_points, step)
-
-
-def _decode_plain(cursor: Cursor, n_frames: int, n_points: int, step: float) -> Basis:
-    """Mirror of `_encode_plain`; raises `CorruptFile`."""
-    kept = cursor.varint(min(n_points, 3 * n_frames), "the number of components")
-    scales = cursor.array("<i2", kept).astype(np.int64)
-    if (np.abs(scales) > MAX_SCALE).any():
-        raise cursor.corrupt("a scale is out of range")
-    mean = np.cumsum(decode_columns(cursor, n_frames, 3), axis=0)
-    vectors = decode_columns(cursor, 3 * n_frames, kept)
-    cursor.end()
-    return _scaled(mean, vectors, scales, n_points, step)
-
-
-def _scaled(mean: Int64, vectors: Int64, scales: Int64, n_points: int, step: float) -> Basis:
-    return Basis(multiples(mean.ravel(), step / np.sqrt(n_points)), multiples(vectors, step) / 2.0 ** (scales / PER_OCTAVE))
 
 
 def find_clusters(trajectories: Float64, n_clusters: int, n_components: int) -> Int64:

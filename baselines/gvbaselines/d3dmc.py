@@ -7,11 +7,13 @@ parallelogram::
 
     segment = [3 x float64] origin, [float64] step, [varint] length, frame 0 [integers]; for each level but the last [varint]
               length, split flags [integers] of all frames' cells there that hold several points; then the representatives
-              [integers] in contexts of their level: level by level, frame by frame, x y z
+              [integers] in contexts of their level: frame by frame, each in the tree's order, differences to the one before,
+              x y z
 
 Readings: the octree is that of frame 0 as it is decoded, for all frames, so that their flags share statistics. A cell is split
 where its vectors are farther than `TOLERANCE` from the representative on average (root mean square). A bound on each vector
-instead takes 2 to 30 % more bits on chicken and cow. The paper codes by CABAC, whose contexts it does not list.
+instead takes 2 to 30 % more bits on chicken and cow. The paper codes by CABAC, whose contexts it does not list. Differences of
+neighbouring representatives are our choice: vectors themselves take 53 % more bits on chicken at KG 1.3, 77 % on cow.
 """
 
 from __future__ import annotations
@@ -56,17 +58,14 @@ class D3dmc(Baseline):
             trees.append(coded)
             decoded[tree.order] += step * motion
         flags = [np.concatenate([each[0][level] for each in trees] or [np.zeros(0, bool)]) for level in range(tree.last)]
-        leaves = [
-            np.concatenate([each[1][level] for each in trees] or [np.zeros((0, 3), np.int64)]) for level in range(tree.last + 1)
-        ]
-        contexts = np.repeat(np.arange(len(leaves)), [leaf.size for leaf in leaves])
+        leaves = np.concatenate([np.zeros((0, 4), np.int64), *(each[1] for each in trees)])
         return b"".join(
             [
                 head,
                 STEP.pack(step),
                 pack_block(encode_integers(residuals_of(first, traversal_of(mesh)))),
                 *(pack_block(encode_integers(own.astype(np.int64))) for own in flags),
-                encode_integers(np.concatenate([leaf.ravel() for leaf in leaves]).astype(np.int64), contexts),
+                encode_integers(np.diff(leaves[:, 1:], axis=0, prepend=0), np.repeat(leaves[:, 0], 3)),
             ]
         )
 
@@ -78,22 +77,24 @@ class D3dmc(Baseline):
         residuals = decode_integers(cursor.block(), count, name=cursor.name).reshape(-1, 3)
         first = values_of(residuals, traversal_of(mesh))
         tree = build_octree(first.astype(np.float64))
-        leaves = _read_leaves(cursor, tree, n_frames - 1)  # (frame, cell) by level
-        contexts = np.repeat(np.arange(len(leaves)), [3 * len(own) for own in leaves])
-        vectors = decode_integers(cursor.rest(), contexts.size, contexts, cursor.name).reshape(-1, 3)
+        frames, levels, cells = _read_leaves(cursor, tree, n_frames - 1)
+        differences = decode_integers(cursor.rest(), 3 * len(levels), np.repeat(levels, 3), cursor.name)
+        vectors = np.cumsum(differences.reshape(-1, 3), axis=0)
         points = np.zeros((n_frames, mesh.n_points, 3), np.int64)
-        points[0], begin = first, 0
-        for level, own in enumerate(leaves):
-            cells, end = own[:, 1], begin + len(own)
-            members = ranges(tree.starts[level][cells], tree.starts[level][cells + 1])
-            sizes = tree.sizes(level, cells)
-            points[1 + np.repeat(own[:, 0], sizes), tree.order[members]] = np.repeat(vectors[begin:end], sizes, axis=0)
-            begin = end
+        points[0] = first
+        for level, starts in enumerate(tree.starts):
+            own = levels == level
+            sizes = tree.sizes(level, cells[own])
+            members = ranges(starts[cells[own]], starts[cells[own] + 1])
+            points[1 + np.repeat(frames[own], sizes), tree.order[members]] = np.repeat(vectors[own], sizes, axis=0)
         return origin + step * np.cumsum(points, axis=0)
 
 
-def _code_frame(wanted: Float64, tree: Octree) -> tuple[tuple[list[Bool], list[Int64]], Int64]:
-    """Code motion ``wanted (P, 3)``, steps, in the tree's order: flags and representatives by level; and what these give."""
+def _code_frame(wanted: Float64, tree: Octree) -> tuple[tuple[list[Bool], Int64], Int64]:
+    """Code motion ``wanted (P, 3)``, steps, in the tree's order.
+
+    Returns flags by level, representatives ``(m, 4)`` in the tree's order, each behind its level, and what these give.
+    """
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(wanted, axis=0)])
     motion = np.zeros(wanted.shape, np.int64)
     flags, leaves, cells = [], [], np.zeros(1, np.int64)
@@ -106,18 +107,19 @@ def _code_frame(wanted: Float64, tree: Octree) -> tuple[tuple[list[Bool], list[I
         is_split = (far > TOLERANCE**2 * sizes) & (sizes > 1) & (level < tree.last)
         if level < tree.last:
             flags.append(is_split[sizes > 1])
-        leaves.append(mean[~is_split])
+        leaves.append(np.column_stack([begin, np.full(len(begin), level), mean])[~is_split])
         kept = ~is_split[cell_of]
         motion[members[kept]] = mean[cell_of[kept]]
         cells = tree.below(level, cells[is_split]) if level < tree.last else cells
-    return (flags, leaves), motion
+    found = np.concatenate(leaves)
+    return (flags, found[np.argsort(found[:, 0]), 1:]), motion
 
 
-def _read_leaves(cursor: Cursor, tree: Octree, n_trees: int) -> list[Int64]:
-    """Mirror of the flags that `_code_frame` gives: by level, ``(m, 2)`` frame and cell of each representative."""
+def _read_leaves(cursor: Cursor, tree: Octree, n_trees: int) -> tuple[Int64, Int64, Int64]:
+    """Mirror of the flags that `_code_frame` gives: frame, level and cell of each representative, in their order."""
     frames, cells = np.arange(n_trees), np.zeros(n_trees, np.int64)
     leaves = []
-    for level in range(tree.last + 1):
+    for level, starts in enumerate(tree.starts):
         is_split = np.zeros(len(cells), bool)
         if level < tree.last:
             several = tree.sizes(level, cells) > 1
@@ -125,9 +127,11 @@ def _read_leaves(cursor: Cursor, tree: Octree, n_trees: int) -> list[Int64]:
             if ((flags < 0) | (flags > 1)).any():
                 raise cursor.corrupt("a flag is neither 0 nor 1")
             is_split[several] = flags == 1
-        leaves.append(np.stack([frames[~is_split], cells[~is_split]], axis=1))
+        leaves.append(np.stack([frames, starts[cells], np.full(len(cells), level), cells])[:, ~is_split])
         if level < tree.last:
             parents = cells[is_split]
             n_below = tree.children[level][parents + 1] - tree.children[level][parents]
             frames, cells = np.repeat(frames[is_split], n_below), tree.below(level, parents)
-    return leaves
+    found = np.concatenate(leaves, axis=1)
+    frames, _, levels, cells = found[:, np.lexsort((found[1], found[0]))]
+    return frames, levels, cells

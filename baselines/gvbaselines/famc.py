@@ -16,14 +16,16 @@ A motion has four rows (`affine_clusters`), which take the place of the amendmen
               motion and for each point, a component for each frequency and axis (`gvpipe.trajectory.coefficient_coding`)
 
 Readings: the amendment's encoder finds clusters by collapsing edges, and so their number; here they are those of the authors'
-earlier paper (`affine_clusters`), and ``clusters`` says how many. CABAC is gvpipe's range coder, with its contexts. Layers are
-gvpipe's vertex hierarchy, which is made from triangles alone as the amendment's are. A transform spans 32 frames: all of
-chicken's 400 take half as much again. Weights are found by least squares, as in the paper.
+earlier paper (`affine_clusters`), as many as take the fewest bytes by a search at the first error. CABAC is gvpipe's range
+coder, with its contexts. Layers are gvpipe's vertex hierarchy, which is made from triangles alone as the amendment's are. A
+transform spans 32 frames: all of chicken's 400 take half as much again. Weights are found by least squares, as in the paper.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import ClassVar
 
 import numpy as np
@@ -48,6 +50,7 @@ from gvpipe.trajectory.spatial_neighbours import hierarchy_order
 MAX_CLUSTERS = 254  # as in the amendment
 STEP_PER_ERROR = 2.5  # at first; the loop around corrects it
 BLOCK = 32  # frames of a transform
+LADDER, START = (6, 12, 25, 50, 100, 200), 25  # numbers of clusters that are tried, the first of them
 PREDICTOR = "navg"  # the mean of the neighbours in coarser layers
 BASE_STEP, MOTION_STEP = 0.5, 0.5  # of the step of what is left
 
@@ -60,43 +63,16 @@ class Famc(Baseline):
     version: ClassVar[int] = 1
     summary: ClassVar[str] = "skinning, DCT in time and layers (FAMC of MPEG-4 AFX, Mamou et al. 2008)"
 
-    clusters: int = 50  # K, 1..254
+    clusters: int = 0  # K, 1..254; 0: as many of `LADDER` as take the fewest bytes
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_range(1, MAX_CLUSTERS, "clusters")
+        self.check_range(0, MAX_CLUSTERS, "clusters")
 
     def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
-        step = STEP_PER_ERROR * error
-        base_step, motion_step = BASE_STEP * step, MOTION_STEP * step
-        head, origin = pack_origin(frames)
-        points = quantise(frames[0] - origin, base_step)
-        base = origin + base_step * points
-        trajectories = np.ascontiguousarray(frames.swapaxes(0, 1)).reshape(mesh.n_points, -1)  # (P, 3n)
-        labels = memo("labels", lambda: find_affine_clusters(frames, mesh, self.clusters))
-        traversal, shifts, places = traversal_of(mesh), shifts_of(trajectories, base), place(base, labels)
-        local = local_coordinates(base, places, labels)
-        fitted = [fit_motion(shifts[labels == k], local[labels == k]) for k in range(len(places.centres))]
-        series = _to_frequencies(np.concatenate(fitted))  # (4K, 3n)
-        coded_motions, decoded = encode_vectors(series, motion_step, independent_order(len(series)), PREDICTOR)
-        motions = _motions(decoded)
-        beside = find_candidates(mesh, labels)
-        weights = find_weights(shifts, base, labels, motions, places, beside)
-        left = _to_frequencies(shifts - blend(base, labels, motions, places, beside, weights))
-        coded_left, _ = encode_vectors(left, step, memo("layers", lambda: _layers(mesh)), PREDICTOR)
-        return b"".join(
-            [
-                head,
-                *(STEP.pack(one) for one in (base_step, motion_step, step)),
-                pack_block(encode_integers(residuals_of(points, traversal))),
-                pack_block(encode_integers(np.diff(labels[traversal.order], prepend=0))),
-                pack_block(encode_integers(weights)),
-                varint(len(places.centres)),
-                pack_block(coded_motions),
-                pack_block(coded_left),
-            ]
-        )
+        encode = partial(_encode, frames, mesh, error, memo)
+        return encode(self.clusters or memo("clusters", lambda: find_count(lambda n: len(encode(n)))))
 
     @classmethod
     def decode_frames(cls, cursor: Cursor, settings: JsonObject, mesh: Topology, n_frames: int) -> Float64:
@@ -120,6 +96,50 @@ class Famc(Baseline):
         left = decode_vectors(coded_left, 3 * n_frames, step, _layers(mesh), cursor.name, predictor=PREDICTOR)
         shifts = _from_frequencies(left) + blend(base, labels, motions, place(base, labels), beside, weights)
         return np.asarray(base + shifts.reshape(mesh.n_points, n_frames, 3).swapaxes(0, 1))
+
+
+def find_count(size: Callable[[int], int]) -> int:
+    """The number of `LADDER` with the least ``size``, from `START` on while a neighbour's is less; each is asked once."""
+    known = cache(size)
+    at = LADDER.index(START)
+    while True:
+        best = min(range(max(at - 1, 0), min(at + 2, len(LADDER))), key=lambda i: (known(LADDER[i]), i != at))
+        if best == at:
+            return LADDER[at]
+        at = best
+
+
+def _encode(frames: Float64, mesh: Topology, error: float, memo: Memo, n_clusters: int) -> bytes:
+    """Code a segment in so many clusters."""
+    step = STEP_PER_ERROR * error
+    base_step, motion_step = BASE_STEP * step, MOTION_STEP * step
+    head, origin = pack_origin(frames)
+    points = quantise(frames[0] - origin, base_step)
+    base = origin + base_step * points
+    trajectories = np.ascontiguousarray(frames.swapaxes(0, 1)).reshape(mesh.n_points, -1)  # (P, 3n)
+    labels = memo(f"labels of {n_clusters}", lambda: find_affine_clusters(frames, mesh, n_clusters))
+    traversal, shifts, places = traversal_of(mesh), shifts_of(trajectories, base), place(base, labels)
+    local = local_coordinates(base, places, labels)
+    fitted = [fit_motion(shifts[labels == k], local[labels == k]) for k in range(len(places.centres))]
+    series = _to_frequencies(np.concatenate(fitted))  # (4K, 3n)
+    coded_motions, decoded = encode_vectors(series, motion_step, independent_order(len(series)), PREDICTOR)
+    motions = _motions(decoded)
+    beside = find_candidates(mesh, labels)
+    weights = find_weights(shifts, base, labels, motions, places, beside)
+    left = _to_frequencies(shifts - blend(base, labels, motions, places, beside, weights))
+    coded_left, _ = encode_vectors(left, step, memo("layers", lambda: _layers(mesh)), PREDICTOR)
+    return b"".join(
+        [
+            head,
+            *(STEP.pack(one) for one in (base_step, motion_step, step)),
+            pack_block(encode_integers(residuals_of(points, traversal))),
+            pack_block(encode_integers(np.diff(labels[traversal.order], prepend=0))),
+            pack_block(encode_integers(weights)),
+            varint(len(places.centres)),
+            pack_block(coded_motions),
+            pack_block(coded_left),
+        ]
+    )
 
 
 def _layers(mesh: Topology) -> CausalOrder:

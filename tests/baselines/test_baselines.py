@@ -15,14 +15,21 @@ from odd_headers import first_payload
 from sequences import awkward, same_triangles, waving
 from shapes import ball
 
+from gvbaselines.awc import analyse, find_wavelets, norms, ring_weights, synthesise
 from gvbaselines.baseline import Baseline
+from gvbaselines.famc import LADDER, START, find_count
+from gvbaselines.rlpca import localised, placed
 from gvbaselines.square_map import map_to_square
+from gvbaselines.tls import join, levels_of, split
+from gvbaselines.tls import norms as band_norms
 from gvbaselines.wavelets import decode_levels, encode_levels, restore, transform
+from gvcodecs.pdct.local_frames import local_frames
 from gvpipe.coding.codec import Encoded
 from gvpipe.coding.quality_scale import error_of
 from gvpipe.container.bitstream import unpack_payload
 from gvpipe.container.cursor import Cursor
 from gvpipe.foundation.errors import FormatError, InputError, SettingError
+from gvpipe.mesh.hierarchy import build_hierarchy
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
 
@@ -35,6 +42,8 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("kglpc", {"taps": 0}),
     ("maverg", {"predictor": "motion"}),
     ("cpca", {"clusters": 3, "components": 0}),
+    ("rlpca", {"clusters": 2}),
+    ("tls", {"levels": 0}),
 ]
 SLOW = pytest.mark.slow
 each_variant = pytest.mark.parametrize(
@@ -160,3 +169,74 @@ def test_wavelets_and_their_coding_give_back_images() -> None:
     assert np.allclose(restore(transform(images[0])), images[0])
     values = np.rint(images).astype(np.int32)
     assert np.array_equal(decode_levels(Cursor(encode_levels(values), "levels"), values.shape), values)
+
+
+@pytest.mark.parametrize("n_frames", [1, 2, 7, 20])
+def test_the_lifting_scheme_gives_back_frames(n_frames: int) -> None:
+    frames = np.random.default_rng(4).normal(0, 1, (n_frames, 5, 3))
+    bands = split(frames, levels_of(n_frames, 4))
+    assert len(bands[0]) == -(-n_frames // 16)
+    assert np.allclose(join(bands), frames)
+
+
+def test_the_lifting_scheme_leaves_no_detail_of_cubic_motion() -> None:
+    """Its prediction has four frames, and so order four; but for frames at the ends."""
+    time = np.arange(40.0)
+    detail = split((time**3 - 20 * time**2).reshape(-1, 1, 1), 1)[1]
+    assert np.abs(detail[2:-2]).max() < 1e-9 < np.abs(detail).max()
+
+
+def test_norms_of_subbands_are_those_of_their_errors() -> None:
+    rng, sizes = np.random.default_rng(8), [64, 64, 128, 256]
+    for band, norm in enumerate(band_norms(3)):
+        bands = [rng.normal(0, 1, (size, 50, 1)) * (k == band) for k, size in enumerate(sizes)]
+        assert np.square(join(bands)).sum() == pytest.approx(norm**2 * sizes[band] * 50, rel=0.1)
+
+
+def test_ring_weights_reproduce_planes() -> None:
+    """A point of a plane has no second difference, however its ring lies; three points on one line have equal weights."""
+    rng = np.random.default_rng(2)
+    angles = np.sort(rng.uniform(0, 1, (30, 6)) + np.arange(6), axis=1)
+    rings = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=2) * rng.uniform(0.8, 1.2, (30, 6, 1))
+    points = 0.1 * rng.normal(0, 1, (30, 3)) * [1, 1, 0]
+    found = ring_weights(points, rings)
+    assert np.allclose(found.sum(axis=1), 1)
+    assert np.allclose((found[..., None] * rings).sum(axis=1), points)
+    line = np.array([[[1.0, 0, 0], [2.0, 0, 0], [3.0, 0, 0]]])
+    assert np.allclose(ring_weights(line[:, 0], line), 1 / 3)
+
+
+def test_wavelets_on_a_mesh_give_back_values() -> None:
+    points, triangles = ball(9, 14)
+    wavelets = find_wavelets(build_hierarchy(triangles.astype(np.int32), len(points)), points.astype(np.float64))
+    values = np.random.default_rng(5).normal(0, 1, (len(points), 4))
+    assert wavelets.levels.max() > 3
+    assert np.allclose(synthesise(analyse(values, wavelets), wavelets), values)
+    assert norms(wavelets)[0] > 1.5 * norms(wavelets)[-1] == pytest.approx(1.5)
+
+
+def test_local_frames_take_rigid_motion_out() -> None:
+    """A body that turns and travels stands still in the frame of one of its triangles, and comes back from there."""
+    points, triangles = ball(9, 14)
+    rng = np.random.default_rng(6)
+    turns = np.linalg.qr(rng.normal(0, 1, (30, 3, 3)))[0]
+    turns *= np.linalg.det(turns)[:, None, None]
+    frames = points @ turns + rng.normal(0, 9, (30, 1, 3))
+    origins, axes = local_frames(frames[:, triangles[20]])
+    local = localised(frames, origins, axes)
+    assert np.allclose(local.reshape(len(points), 30, 3), local.reshape(len(points), 30, 3)[:, :1])
+    assert np.allclose(placed(local, origins, axes), frames)
+
+
+@pytest.mark.parametrize("least", LADDER)
+def test_a_search_finds_the_number_of_clusters(least: int) -> None:
+    asked: list[int] = []
+
+    def size(n: int) -> int:
+        asked.append(n)
+        return abs(LADDER.index(n) - LADDER.index(least))
+
+    assert find_count(size) == least
+    assert asked[0] in (START, LADDER[LADDER.index(START) - 1])
+    assert len(set(asked)) == len(asked) <= 3 + abs(LADDER.index(least) - LADDER.index(START))
+    assert find_count(lambda n: 7) == START

@@ -58,6 +58,44 @@ def test_balls_of_two_tessellations_are_their_difference_of_radius_away() -> Non
     assert errors.rms**2 * 0.98 < errors.d2_mse <= errors.d1_mse < errors.rms**2 * 1.05
 
 
+def test_d1_and_d2_are_those_of_trimesh_and_plain_loops() -> None:
+    """Every line through every triangle, all pairs of points; normals and barycentric coordinates are trimesh's."""
+    rng, grid = np.random.default_rng(3), 24
+    turn = np.linalg.qr(rng.normal(0, 1, (3, 3)))[0]
+    first, faces = _ball(1)[0] @ turn, _ball(1)[1]
+    second = first + rng.normal(0, 0.03, first.shape)
+    low, step = first.min(axis=0), float(np.ptp(first, axis=0).max()) / (grid - 1)
+    clouds = [_on_lines(trimesh.Trimesh(points, faces, process=False), low, step) for points in (first, second)]
+    ways = []
+    for (points, _), (others, normals) in (clouds, clouds[::-1]):
+        apart = points[:, None] - others
+        nearest = np.square(apart).sum(axis=2).argmin(axis=1)
+        found = apart[np.arange(len(points)), nearest]
+        ways.append((np.square(found).sum(axis=1).mean(), np.square((found * normals[nearest]).sum(axis=1)).mean()))
+    errors = surface_distances(first, faces, second, faces, samples=10, grid=grid)
+    assert (errors.d1_mse, errors.d2_mse) == pytest.approx(np.max(ways, axis=0), rel=1e-9)
+    assert errors.d1_psnr == pytest.approx(10 * np.log10(3 * ((grid - 1) * step) ** 2 / np.max(ways, axis=0)[0]))
+
+
+def _on_lines(mesh: trimesh.Trimesh, low: Float64, step: float) -> tuple[Float64, Float64]:
+    """Points ``(P, 3)`` where lines of a grid meet triangles, along the axis nearest to each normal, and these normals."""
+    points, normals = [], []
+    for triangle, normal in zip(mesh.triangles, mesh.face_normals, strict=True):
+        axis = int(np.abs(normal).argmax())
+        plane = [each for each in range(3) if each != axis]
+        flat = triangle.copy()
+        flat[:, axis] = 0
+        steps = [np.arange(-6, 36) * step + low[each] for each in plane]
+        places = np.zeros((42 * 42, 3))
+        places[:, plane] = np.stack(np.meshgrid(*steps, indexing="ij"), axis=2).reshape(-1, 2)
+        repeated = np.repeat(flat[None], len(places), axis=0)
+        parts = trimesh.triangles.points_to_barycentric(repeated, places)  # type: ignore[no-untyped-call] # trimesh has no types
+        inside = parts[(parts >= 0).all(axis=1)]
+        points.append(inside @ triangle)
+        normals.append(np.repeat(normal[None], len(inside), axis=0))
+    return np.concatenate(points), np.concatenate(normals)
+
+
 def test_the_larger_of_both_ways_counts() -> None:
     """A square with another far above: from the lower one alone nothing is far."""
     both = np.concatenate([SQUARE, np.add(SQUARE, [0, 0, 2])])

@@ -12,6 +12,7 @@ KG = "kg"
 FINE = 90.0  # a quality whose error is below those of the papers' tables
 NO_NUMBER = {
     "afxic": "the paper is not at hand; FAMC's abstract and Figures 7 and 8 of the mcgv paper compare with it",
+    "awc": "the abstract has no number; Figure 9 of the pdct paper compares with it",
     "coddyac": "no text with a number of Coddyac alone is at hand; the pca paper's abstract compares with such methods",
     "gv": "the paper is not at hand; Figure 9 of the mcgv paper compares with it",
     "kglpc": "the paper is not at hand; Figure 9 of the pdct paper compares with it",
@@ -24,7 +25,7 @@ NO_NUMBER = {
 def claims() -> list[Claim]:
     """The figures, by baseline."""
     none = [Claim(f"baselines-{name}", f"`{name}`", "its own figures", None, "", note=why) for name, why in NO_NUMBER.items()]
-    return [*_dynapack(), *_d3dmc(), *_famc(), *_cpca(), *none]
+    return [*_dynapack(), *_d3dmc(), *_famc(), *_cpca(), *_rlpca(), _tls(), *none]
 
 
 def _dynapack() -> list[Claim]:
@@ -74,6 +75,22 @@ def _cpca() -> list[Claim]:
         note = "averaged over the curve; the abstract has no number"
         made.append(Claim(f"baselines-cpca-{other}", "`cpca`, abstract", text, 0, "% of rate", AT_LEAST, measure, note))
     return made
+
+
+def _rlpca() -> list[Claim]:
+    made = []
+    for other, title in (("pdct:clusters=40", "PDCT"), ("cpca", "CPCA"), ("pcaanim", "PCA"), ("kglpc", "KG")):
+        text = f"fewer bits than {title}, on chicken"
+        measure = less_rate_overall("chicken", "rlpca", other, "da")
+        key, note = f"baselines-rlpca-{other.split(':')[0]}", "averaged over the curve; the text has no number"
+        made.append(Claim(key, "`rlpca`, pdct paper, Figure 9", text, 0, "% of rate", AT_LEAST, measure, note))
+    return made
+
+
+def _tls() -> Claim:
+    measure = less_error("chicken", "pdct:clusters=40", "tls", "da", 2.7)
+    text = "PDCT has 95 % less error at one rate, on chicken"
+    return Claim("baselines-tls-pdct", "`tls`, pdct paper, Figure 8", text, 95, "% of error", ABOUT, measure, "at 2.7 bpvf")
 
 
 def _bits_per_coordinate(sequence: str, codec: str) -> Callable[[Lab], float | None]:

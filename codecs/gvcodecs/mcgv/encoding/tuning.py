@@ -30,6 +30,7 @@ class Tuning:
         coarsest_bases: lattice steps of base frames, in target errors (0068).
         large_base: part of the bytes that a base frame must take for the second of them to be tried (0068).
         rebased_by: a coarser base frame has so many times the lattice step at least (0068).
+        refits: last fits of a blend: for so many times the step, and for which error; 0: for the step (0063).
         published_error: in lattice steps, what the published mode's base frame leaves at least (0067).
         least_rigid: part of the points that move with one cluster alone, for the error of rigid parts to be tried (0067).
         fine_lattices: lattice steps of base frames for it, in those errors: the smallest mesh is taken (0067).
@@ -57,6 +58,7 @@ class Tuning:
     coarsest_bases: tuple[float, float] = (1.0, 1.3)
     large_base: float = 0.25
     rebased_by: float = 1.2
+    refits: tuple[tuple[float, float], ...] = ((1.0, 1.0), (1.0, 1.07), (0.8, 0.0), (1.0, 0.93))
     published_error: float = 0.43
     least_rigid: float = 0.99
     fine_lattices: tuple[float, ...] = (1.05, 1.2, 1.35, 1.5)

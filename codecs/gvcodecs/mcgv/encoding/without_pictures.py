@@ -21,6 +21,7 @@ from gvpipe.foundation.elementary import power
 from gvpipe.mesh.lattice import Lattice
 from gvpipe.rate_control.step_search import SLOPE, Goal, StepTrial, find_step
 
+MISSES = 2  # fits of a blend that do not pay, one after the other
 FINER = 2  # finer steps for a blend alone, the second where the first nearly met the target error
 
 
@@ -136,16 +137,26 @@ def _choose_base(
 def _fit_on_base(
     trials: StepTrials, trial: StepTrial, target_error: float, close_enough: tuple[float, float]
 ) -> tuple[StepTrials, StepTrial]:
-    """The blend, or another one, fitted on the base frame and for the step that were found, if the file is smaller."""
-    others = _fit_anew(trials, trial.step, target_error)
-    if others.candidate.fitted is trials.candidate.fitted:
-        return trials, trial
-    other = _find(others, trial.step, target_error, close_enough)
-    return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
+    """The blend, or another one, fitted on the base frame and from the step that were found: what makes the file smallest.
+
+    A fit knows the bytes of transforms by an estimate, so several are made, each from the best one before, and coded.
+    They end where `MISSES` in a row were larger. Where the number of clusters is given, there is one.
+    """
+    misses, refits = 0, TUNING.refits[:1] if trials.job.settings.clusters else TUNING.refits
+    for change, part in refits:
+        others = _fit_anew(trials, change * trial.step, part * target_error)
+        if others.candidate.fitted is trials.candidate.fitted:
+            continue
+        other, misses = _find(others, trial.step, target_error, close_enough), misses + 1
+        if other.error <= target_error and cost(other) < cost(trial):
+            trials, trial, misses = others, other, 0
+        if misses == MISSES:
+            break
+    return trials, trial
 
 
 def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrials:
-    """Trials of another blend on the same base frame, fitted from a step on for a target error, model units."""
+    """Trials of another blend on the same base frame, fitted from a step on for an error (0: for the step), model units."""
     start = dataclasses.replace(trials.candidate.start, step=step)
     return StepTrials(trials.job, Candidate(start, fit_skinning(trials.job, start, target_error, trials.candidate.fitted)[0]))
 
