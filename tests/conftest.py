@@ -40,7 +40,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(optionalhook=True)  # without pytest-xdist nobody asks
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One more than cores for quick tests: some wait, for time to pass or for a kernel that another worker compiles."""
-    return count_cores() + (config.option.markexpr == "not slow")
+    return count_cores() + int(config.getoption("markexpr") == "not slow")
 
 
 def pytest_collection_finish() -> None:
