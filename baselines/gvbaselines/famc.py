@@ -16,9 +16,10 @@ A motion has four rows (`affine_clusters`), which take the place of the amendmen
               motion and for each point, a component for each frequency and axis (`gvpipe.trajectory.coefficient_coding`)
 
 Readings: the amendment's encoder finds clusters by collapsing edges, and so their number; here they are those of the authors'
-earlier paper (`affine_clusters`), as many as take the fewest bytes for 32 frames at the first error. CABAC is gvpipe's range
-coder, with its contexts. Layers are gvpipe's vertex hierarchy, which is made from triangles alone as the amendment's are. A
-transform spans 32 frames: all of chicken's 400 take half as much again. Weights are found by least squares, as in the paper.
+earlier paper (`affine_clusters`). ``clusters`` says how many, or 0 to search for as many as take the fewest bytes. CABAC is
+gvpipe's range coder, with its contexts. Layers are gvpipe's vertex hierarchy, which is made from triangles alone as the
+amendment's are. A transform spans 32 frames: all of chicken's 400 take half as much again. Weights are found by least squares,
+as in the paper.
 """
 
 from __future__ import annotations
@@ -51,7 +52,6 @@ MAX_CLUSTERS = 254  # as in the amendment
 STEP_PER_ERROR = 2.5  # at first; the loop around corrects it
 BLOCK = 32  # frames of a transform
 LADDER, START = (6, 12, 25, 50, 100, 200), 25  # numbers of clusters that are tried, the first of them
-SEARCHED = 32  # frames that they are tried on
 PREDICTOR = "navg"  # the mean of the neighbours in coarser layers
 BASE_STEP, MOTION_STEP = 0.5, 0.5  # of the step of what is left
 
@@ -64,7 +64,7 @@ class Famc(Baseline):
     version: ClassVar[int] = 1
     summary: ClassVar[str] = "skinning, DCT in time and layers (FAMC of MPEG-4 AFX, Mamou et al. 2008)"
 
-    clusters: int = 0  # K, 1..254; 0: as many of `LADDER` as take the fewest bytes
+    clusters: int = 50  # K, 1..254; 0: as many of `LADDER` as take the fewest bytes, which takes 3 to 5 times as long
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -72,7 +72,11 @@ class Famc(Baseline):
 
     def code_frames(self, frames: Float64, mesh: Topology, error: float, memo: Memo) -> bytes:
         """Code a segment; see `Baseline.code_frames`."""
-        n_clusters = self.clusters or memo("clusters", lambda: _choose_clusters(frames, mesh, error))
+
+        def size(n_clusters: int) -> int:
+            return len(_encode(frames, mesh, error, memo, n_clusters))
+
+        n_clusters = self.clusters or memo("clusters", lambda: find_count(size))
         return _encode(frames, mesh, error, memo, n_clusters)
 
     @classmethod
@@ -97,12 +101,6 @@ class Famc(Baseline):
         left = decode_vectors(coded_left, 3 * n_frames, step, _layers(mesh), cursor.name, predictor=PREDICTOR)
         shifts = _from_frequencies(left) + blend(base, labels, motions, place(base, labels), beside, weights)
         return np.asarray(base + shifts.reshape(mesh.n_points, n_frames, 3).swapaxes(0, 1))
-
-
-def _choose_clusters(frames: Float64, mesh: Topology, error: float) -> int:
-    """The number of `LADDER` for which about `SEARCHED` frames, evenly spaced, take the fewest bytes."""
-    chosen, memo = np.ascontiguousarray(frames[:: -(-len(frames) // SEARCHED)]), Memo()
-    return find_count(lambda n: len(_encode(chosen, mesh, error, memo, n)))
 
 
 def find_count(size: Callable[[int], int]) -> int:
