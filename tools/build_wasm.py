@@ -50,7 +50,7 @@ TRELLIS = ("gvpipe.entropy.learning_kernels.LearningStream", ["uint64[1]", "uint
 VECTORS = ("gvpipe.trajectory.prediction_kernels.VectorCoding", [CAUSAL, "float64", NUMBERS, ROWS, ROWS, FLOATS])
 MIXING = (
     "gvpipe.entropy.decision_kernels.Mixing",
-    [NUMBERS, "uint8[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
+    ["uint32[2]", NUMBERS, LONGS, LONGS, LONGS, LONGS],
 )
 ENTRIES = ("gvpipe.mesh.entry_kernels.EntryOrder", [LONGS, LONGS, NUMBERS])
 LISTS = ("gvpipe.connectivity.visit_kernels.NeighbourLists", [LONGS, INTS])

@@ -59,7 +59,7 @@ SHARED = {
     "gvpipe.container.stream_layout": "INDEX_UUID ROOM_UUID SHOTS_UUID DATA_UUID MAX_INDEX",
     "gvpipe.coding.corrections.displacements": "MAX_POSITIONS NEAR",
     "gvpipe.entropy.block_coder": "PARAMETRIC",
-    "gvpipe.entropy.decision_kernels": "ONE_BITS AHEAD PLACE RANGE",
+    "gvpipe.entropy.decision_kernels": "ONE_BITS SEEN_BITS AHEAD PLACE RANGE",
     "gvpipe.entropy.forecast_kernels": "N_FORECASTS",
     "gvpipe.entropy.integers": "MAX_CONTEXTS",
     "gvpipe.entropy.logistic_tables": "LIMIT SPACING KNOTS",

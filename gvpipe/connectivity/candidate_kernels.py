@@ -26,10 +26,10 @@ import numpy as np
 
 from gvpipe.connectivity.order_kernels import code_index
 from gvpipe.connectivity.visit_kernels import NeighbourLists, search_visits
-from gvpipe.entropy.decision_kernels import Mixing, code_decision
+from gvpipe.entropy.decision_kernels import SEEN_BITS, Mixing, code_decision
 from gvpipe.entropy.number_kernels import SLOT_BITS, code_number, mix_hash
-from gvpipe.foundation.arrays import Bool, Int64, UInt8
-from gvpipe.runtime.compiled import compiled
+from gvpipe.foundation.arrays import Bool, Int32, Int64, UInt8, UInt32
+from gvpipe.runtime.compiled import compiled, inlined
 
 N_CONTEXTS = 7  # of a choice
 N_GROUPS = 5  # of mixers of choices: no repetition; a short or a long one, which expects this kind or does not
@@ -37,7 +37,11 @@ NUMBER_CONTEXTS = 4
 RANKS, AGES = 0, 1  # groups of mixers of numbers
 NUMBER_GROUPS = 2
 LATEST = 3  # vertices whose surroundings have candidates
+STEPS = (1, 0, -1, 2, -2, 3)  # visits from that of a neighbour on; of the newest vertex
+FEW_STEPS = 3  # of these, of the others
 MOST = 40  # candidates
+PLACE_BITS = 6  # of their places
+LAST_PLACE = (1 << PLACE_BITS) - 1
 HUB = 24  # neighbours; vertices with more are never open, so that they cost nothing
 OLDEST = 256  # open vertices counted
 MATCHED = 6  # kinds that a repetition must have had alike before it counts
@@ -45,39 +49,48 @@ MAX_RUN, LONG_RUN = 15, 8
 
 
 class Front(NamedTuple):
-    """The vertices visited so far, of V; all but ``visited`` int64.
+    """The vertices visited so far, of V; all but ``visited`` int32.
 
     Args:
         visited: ``(V,)``.
         times: ``(V,)`` when each was visited; -1: not yet.
         around: ``(V,)`` visited neighbours of each vertex.
+        unvisited: ``(E,)`` the other neighbours in their order, from where the lists of all begin; of hubs, no matter what.
         n_open: ``(V,)`` by time of a visit: neighbours not visited, 0 for a hub.
         older, newer: ``(V + 1,)`` by time: the open visit before and after it; V stands for both ends.
         left, position: ``(V,)`` the vertices not visited, in the order that removals by swapping leave; of each in that order.
     """
 
     visited: Bool
-    times: Int64
-    around: Int64
-    n_open: Int64
-    older: Int64
-    newer: Int64
-    left: Int64
-    position: Int64
+    times: Int32
+    around: Int32
+    unvisited: Int32
+    n_open: Int32
+    older: Int32
+    newer: Int32
+    left: Int32
+    position: Int32
 
 
 class Candidates(NamedTuple):
-    """Candidates for one vertex, int64.
+    """Candidates for one vertex, in the order in which they were found; int32.
 
     Args:
-        vertices, relations, chances: ``(MOST,)``; chances are those of the relations.
+        vertices, relations: ``(MOST,)``.
+        keys: ``(MOST,)`` int64: the chance of the relations, and how many were found later; -1 of a candidate that was tried.
         places: ``(V,)`` of a vertex among candidates; -1: none.
+        sources: ``(S,)`` times of visits whose neighbours are candidates, in the order in which they were found.
+        marks: ``(V,)`` by time of a visit: relations that its neighbours have, 0 for no source.
+        around: ``(HUB,)`` memory for times of neighbours.
     """
 
-    vertices: Int64
-    relations: Int64
-    chances: Int64
-    places: Int64
+    vertices: Int32
+    relations: Int32
+    keys: Int64
+    places: Int32
+    sources: Int32
+    marks: Int32
+    around: Int32
 
 
 class Others(NamedTuple):
@@ -136,12 +149,28 @@ def code_by_candidates(
         visits: the codec's vertex of each vertex of the user's.
     """
     n = len(visits)
-    count, time = np.zeros(n, np.int64), np.full(n + 1, n, np.int64)
+    count, time, number = np.zeros(n, np.int32), np.full(n + 1, n, np.int32), np.arange(n).astype(np.int32)
     front = Front(
-        np.zeros(n, np.bool_), np.full(n, -1, np.int64), count, count.copy(), time, time.copy(), np.arange(n), np.arange(n)
+        np.zeros(n, np.bool_),
+        np.full(n, -1, np.int32),
+        count,
+        lists.neighbours.copy(),
+        count.copy(),
+        time,
+        time.copy(),
+        number,
+        number.copy(),
     )
-    memory = np.zeros((3, MOST), np.int64)
-    candidates = Candidates(memory[0], memory[1], memory[2], np.full(n, -1, np.int64))
+    n_sources = LATEST + HUB * (len(STEPS) + (LATEST - 1) * FEW_STEPS)
+    candidates = Candidates(
+        np.zeros(MOST, np.int32),
+        np.zeros(MOST, np.int32),
+        np.zeros(MOST, np.int64),
+        np.full(n, -1, np.int32),
+        np.zeros(n_sources, np.int32),
+        np.zeros(n, np.int32),
+        np.zeros(HUB, np.int32),
+    )
     search = front.visited, np.full(n, -1, np.int64), np.empty(min(reach, n) + 1, np.int64)
     others = Others(reach, search, numbers, np.empty(NUMBER_CONTEXTS, np.int64), np.zeros(3, np.int64))
     coder = Coder(state, data, decoding, np.full(1, -1, np.int64))
@@ -161,17 +190,16 @@ def _code(
 ) -> bool:
     """As `code_by_candidates`."""
     n = len(visits)
-    kinds, latest = np.zeros(n + MATCHED, np.int64), np.full(1 << SLOT_BITS, -1, np.int64)
-    contexts = np.empty(N_CONTEXTS, np.int64)
+    kinds, latest = np.zeros(n + MATCHED, np.int64), np.full(1 << SLOT_BITS, -1, np.int32)
+    contexts = np.empty(N_CONTEXTS, np.uint32)
     first_left, match, run = 0, -1, 0
     for v in range(n):
         row = v + MATCHED
         if not coder.decoding:
             coder.wanted[0] = visits[v]
         count = _find(lists, points, visits, v, front, candidates)
-        _sort(candidates, count, choices.chances[0])
         expected = kinds[match] if match >= 0 else -1
-        history = (kinds[row - 3 : row], expected, run)
+        history = (kinds[row - 1], kinds[row - 2], kinds[row - 3], expected, run)
         chosen, kind = _choose(lists, front.around, candidates, count, history, choices, contexts, coder)
         if chosen >= 0:
             target = candidates.vertices[chosen]
@@ -183,6 +211,7 @@ def _code(
                 return False
         for i in range(count):
             candidates.places[candidates.vertices[i]] = -1
+            candidates.relations[i] = 0
         visits[v] = target
         _visit(lists, target, v, front)
         while first_left < n and front.visited[first_left]:
@@ -204,79 +233,94 @@ def _code(
 
 @compiled
 def _find(lists: NeighbourLists, points: Int64, visits: Int64, v: int, front: Front, candidates: Candidates) -> int:
-    """Fill the candidates for vertex v, and return how many there are."""
-    count = 0
+    """Fill the candidates for vertex v, and return how many there are.
+
+    A visit is found in several ways. So all relations of its neighbours are known before they are looked at, once.
+    """
+    n_sources = 0
     for back in range(1, min(LATEST, v) + 1):
-        near, shift = visits[v - back], 8 * (back - 1)
-        begin, end = lists.starts[near], lists.starts[near + 1]
+        begin, end = lists.starts[visits[v - back]], lists.starts[visits[v - back] + 1]
         if end - begin > HUB:
             continue
+        shift, n_around = 8 * (back - 1), 0
+        n_sources = _mark(candidates, n_sources, v - back, 1 << shift)
         for k in range(begin, end):
-            y = lists.neighbours[k]
-            if not front.visited[y]:
-                count = _add(candidates, count, y, (3 if points[y] == points[near] else 1) << shift)
-        for j in range(6 if back == 1 else 3):
-            step = 1 if j == 0 else 0 if j == 1 else -1 if j == 2 else 2 if j == 3 else -2 if j == 4 else 3
-            for k in range(begin, end):
-                time = front.times[lists.neighbours[k]]
-                if time < 0 or time + step < 0 or time + step >= v - 1 or front.n_open[time + step] == 0:
-                    continue
-                other = visits[time + step]
-                for i in range(lists.starts[other], lists.starts[other + 1]):
-                    y = lists.neighbours[i]
-                    if not front.visited[y]:
-                        count = _add(candidates, count, y, 4 << (shift + j))
+            time = front.times[lists.neighbours[k]]
+            candidates.around[n_around] = time
+            n_around += 1 if time >= 0 else 0
+        for j in range(len(STEPS) if back == 1 else FEW_STEPS):
+            for k in range(n_around):
+                time = candidates.around[k] + STEPS[j]
+                if 0 <= time < v - 1:
+                    n_sources = _mark(candidates, n_sources, time, 4 << (shift + j))
+    count = 0
+    for i in range(n_sources):
+        time = candidates.sources[i]
+        begin, relation = lists.starts[visits[time]], candidates.marks[time]
+        candidates.marks[time] = 0
+        for k in range(begin, begin + front.n_open[time]):
+            count = _add(candidates, count, front.unvisited[k], relation)
+    for back in range(1, min(LATEST, v) + 1):
+        near = visits[v - back]
+        for k in range(lists.starts[near], lists.starts[near] + front.n_open[v - back]):
+            y = front.unvisited[k]
+            if points[y] == points[near] and candidates.places[y] >= 0:
+                candidates.relations[candidates.places[y]] |= 2 << (8 * (back - 1))
     return count
 
 
-@compiled
+@inlined
+def _mark(candidates: Candidates, n_sources: int, time: int, relation: int) -> int:
+    """Note a relation of a visit's neighbours; return how many sources there are then."""
+    before = candidates.marks[time]
+    candidates.marks[time] = before | relation
+    candidates.sources[n_sources] = time
+    return n_sources + (1 if before == 0 else 0)
+
+
+@inlined
 def _add(candidates: Candidates, count: int, y: int, relation: int) -> int:
-    """Note a relation of vertex y; return how many candidates there are then."""
-    place = candidates.places[y]
-    if place >= 0:
-        candidates.relations[place] |= relation
-    elif count < MOST:
-        candidates.vertices[count], candidates.relations[count], candidates.places[y] = y, relation, count
-        return count + 1
-    return count
-
-
-@compiled
-def _sort(candidates: Candidates, count: int, learnt: Int64) -> None:
-    """Sort candidates, those of the highest chance first; others stay in the order in which they were found."""
-    vertices, relations, chances = candidates.vertices, candidates.relations, candidates.chances
-    for i in range(count):
-        y, relation = vertices[i], relations[i]
-        chance = learnt[mix_hash(1, relation) >> (32 - SLOT_BITS)]
-        j = i
-        while j > 0 and chances[j - 1] < chance:
-            vertices[j], relations[j], chances[j] = vertices[j - 1], relations[j - 1], chances[j - 1]
-            j -= 1
-        vertices[j], relations[j], chances[j] = y, relation, chance
+    """Note relations of vertex y; return how many candidates there are then."""
+    known = candidates.places[y]
+    if known < 0 and count == MOST:
+        return count
+    place = known if known >= 0 else count
+    candidates.vertices[place], candidates.places[y] = y, place
+    candidates.relations[place] |= relation
+    return count + (1 if known < 0 else 0)
 
 
 @compiled
 def _choose(
     lists: NeighbourLists,
-    around: Int64,
+    around: Int32,
     candidates: Candidates,
     count: int,
-    history: tuple[Int64, int, int],
+    history: tuple[int, int, int, int, int],
     choices: Mixing,
-    slots: Int64,
+    slots: UInt32,
     coder: Coder,
 ) -> tuple[int, int]:
-    """Code which candidate it is; return its place and its kind, -1 and 0 if it is none."""
-    recent, expected, run = history
+    """Code which candidate it is; return its place and its kind, -1 and 0 if it is none.
+
+    ``history``: the last three kinds, the newest first; the expected one; how long the repetition is.
+    """
+    before, second, third, expected, run = history
     state, data, decoding, wanted = coder.state, coder.data, coder.decoding, coder.wanted[0]
-    before = recent[2]
-    longer = mix_hash(mix_hash(before, recent[1]), recent[0])
+    longer = mix_hash(mix_hash(before, second), third)
     for i in range(count):
-        y, relation = candidates.vertices[i], candidates.relations[i]
+        slot = mix_hash(1, candidates.relations[i]) >> (32 - SLOT_BITS)
+        candidates.keys[i] = np.int64(choices.chances[0, slot] >> SEEN_BITS) << PLACE_BITS | (LAST_PLACE - i)
+    for i in range(count):
+        highest = candidates.keys[0]
+        for j in range(1, count):
+            highest = max(highest, candidates.keys[j])
+        place = LAST_PLACE - (highest & LAST_PLACE)
+        candidates.keys[place] = -1
+        y, relation = candidates.vertices[place], candidates.relations[place]
         alike = 0
-        for j in range(i):
-            if candidates.relations[j] == relation:
-                alike += 1
+        for j in range(place):  # those found later have the same chance, and come later
+            alike += 1 if candidates.relations[j] == relation else 0
         kind = mix_hash(mix_hash(8, relation), alike)
         is_expected = 1 if kind == expected else 0
         shape = 8 * min(around[y], 7) + min(lists.starts[y + 1] - lists.starts[y] - around[y], 7)
@@ -291,7 +335,7 @@ def _choose(
             slots[k] >>= 32 - SLOT_BITS
         group = 0 if expected < 0 else 1 + is_expected if run < LONG_RUN else 3 + is_expected
         if code_decision(choices, slots, N_GROUPS * (relation & 3) + group, state, data, decoding, 1 if y == wanted else 0):
-            return i, kind
+            return place, kind
     return -1, 0
 
 
@@ -302,7 +346,7 @@ def _code_other(
     v: int,
     first_left: int,
     front: Front,
-    tried: Int64,
+    tried: Int32,
     before: int,
     others: Others,
     coder: Coder,
@@ -364,21 +408,11 @@ def _age(lists: NeighbourLists, target: int, front: Front) -> int:
 @compiled
 def _code_neighbour(lists: NeighbourLists, near: int, front: Front, count: int, target: int, coder: Coder) -> int:
     """Code which of the ``count`` neighbours of vertex ``near`` that are not visited it is, and return it."""
-    begin, end = lists.starts[near], lists.starts[near + 1]
-    place = 0
+    begin, place = lists.starts[near], 0
     if not coder.decoding:
-        for k in range(begin, end):
-            if lists.neighbours[k] == target:
-                break
-            place += 0 if front.visited[lists.neighbours[k]] else 1
-    place = code_index(coder.state, coder.data, coder.decoding, place, count)
-    for k in range(begin, end):
-        y = lists.neighbours[k]
-        if not front.visited[y]:
-            if place == 0:
-                return int(y)
-            place -= 1
-    return -1
+        while place + 1 < count and front.unvisited[begin + place] != target:
+            place += 1
+    return int(front.unvisited[begin + code_index(coder.state, coder.data, coder.decoding, place, count)])
 
 
 @compiled
@@ -388,6 +422,7 @@ def _visit(lists: NeighbourLists, target: int, v: int, front: Front) -> None:
     begin, end = lists.starts[target], lists.starts[target + 1]
     for k in range(begin, end):
         y = lists.neighbours[k]
+        _remove(lists, target, y, front)
         front.around[y] += 1
         time = front.times[y]
         if time >= 0 and front.n_open[time] > 0:
@@ -402,6 +437,17 @@ def _visit(lists: NeighbourLists, target: int, v: int, front: Front) -> None:
         front.older[v], front.newer[v], front.newer[newest], front.older[n] = newest, n, v, v
     last = front.left[n - 1 - v]
     front.left[front.position[target]], front.position[last] = last, front.position[target]
+
+
+@inlined
+def _remove(lists: NeighbourLists, target: int, y: int, front: Front) -> None:
+    """Take a vertex out of the list of neighbours of y that are not visited."""
+    begin, end = lists.starts[y], lists.starts[y + 1]
+    if end - begin <= HUB:
+        place = begin
+        for k in range(begin, end - front.around[y]):
+            front.unvisited[place] = front.unvisited[k]
+            place += 0 if front.unvisited[k] == target else 1
 
 
 @compiled

@@ -41,8 +41,10 @@ FACTOR, FIRST_COUNT = 0.6, 0.5  # of the expected magnitude, at first; as if so 
 LEAST_SCALE = 0.04  # lattice units
 UNKNOWN = 1024.0  # expected magnitude without neighbours, lattice units
 REMEMBERED = 1 << 17  # coordinates below that are remembered
+ROW_BITS = 4  # of so many bits of a coordinate: rows of coordinates that are skipped as a whole
 MOST_LISTED = 16
 REACH, LEAST_REACH, MOST_REACH = 8.0, 4.0, 512.0  # scales that listed numbers are off at most; the same in lattice units
+MEAN, ERROR, BEND, MAGNITUDE = range(4)  # of what is known of a position's surroundings
 SHARES, FIRST_SHARE, SHARE_RATE, LEAST_SHARE = 8, 0.3, 0.2, 0.01
 
 
@@ -53,7 +55,7 @@ class _Learnt(NamedTuple):
         weights: ``(CLASSES, N_FEATURES)`` of features; variances: ``(CLASSES, N_FEATURES, N_FEATURES)`` of these.
         errors, expected: ``(CLASSES, LEVELS)`` sums of magnitudes of errors, and of what was expected.
         shares: ``(3, SHARES)`` of coordinates that were there before.
-        present: ``(3, REMEMBERED)`` whether a coordinate was.
+        present: ``(3, REMEMBERED)`` whether a coordinate was; rows: ``(3, R)`` whether one of a row was.
     """
 
     weights: Float64
@@ -62,6 +64,7 @@ class _Learnt(NamedTuple):
     expected: Float64
     shares: Float64
     present: Bool
+    rows: Bool
 
 
 @compiled
@@ -77,6 +80,7 @@ def _new_learnt() -> _Learnt:
         np.full((CLASSES, LEVELS), FIRST_COUNT),
         np.full((3, SHARES), FIRST_SHARE),
         np.zeros((3, REMEMBERED), np.bool_),
+        np.zeros((3, REMEMBERED >> ROW_BITS), np.bool_),
     )
 
 
@@ -96,15 +100,17 @@ def code_fitted(
     flat, angles, learnt = triangles.ravel(), new_angles(triangles, opposite, n), _new_learnt()
     residuals = np.zeros((n + MATCHED, 3), np.int64)  # in their order, behind zeros
     errors, is_done = np.zeros((n, 3)), np.zeros(n, np.bool_)
-    latest = np.full(1 << MATCH_BITS, -1, np.int64)
+    latest = np.full(1 << MATCH_BITS, -1, np.int32)
     contexts, guess, mean = np.empty(N_CONTEXTS, np.int64), np.zeros(3, np.int64), np.zeros(3, np.int64)
     features, along, across, gain = np.zeros(N_FEATURES), np.zeros(3), np.zeros(3), np.zeros(N_FEATURES)
-    forecast = new_forecast(MOST_LISTED)
+    around, forecast = np.zeros((4, 3)), new_forecast(MOST_LISTED, N_CONTEXTS)
     match, run = -1, 0
     for i in range(n):
         entry, row, first = order.order[i], i + MATCHED, order.starts[i]
         predict_mean(order, i, positions, guess, mean)
         shift_parallelograms(order, i, positions, angles, along, across)
+        _look_around(order, i, positions, errors, around)
+        _bend(order, i, positions, (flat, opposite, is_done), around)
         kind = _count_parallelograms(order, i)
         if match < 0:
             run = 0
@@ -121,11 +127,9 @@ def code_fitted(
             if first < order.starts[i + 1]:
                 a = positions[order.gates[first, 0], c]
                 b = positions[order.gates[first, 1], c] if order.gates[first, 1] >= 0 else a
-            _set_features(order, i, c, positions, errors, features)
-            features[2] = _bend(order, i, c, positions, (flat, opposite, is_done))
+            features[0], features[1], features[2] = around[MEAN, c] - guess[c], around[ERROR, c], around[BEND, c]
             features[3], features[4] = along[c], across[c]
-            features[0] -= guess[c]
-            magnitude = _expect(order, i, c, errors)
+            magnitude = around[MAGNITUDE, c]
             if c > 0:
                 magnitude = 0.5 * (magnitude + before_error / c)
             level = _level(magnitude)
@@ -165,6 +169,7 @@ def code_fitted(
             _learn_share(learnt, c, group_of_share, forecast, residual)
             if positions[entry, c] < REMEMBERED:
                 learnt.present[c, positions[entry, c]] = True
+                learnt.rows[c, positions[entry, c] >> ROW_BITS] = True
             _learn_weights(learnt, kind, features, gain, error, forecast.shape[SCALE])
         is_done[entry] = True
         learn_angles(order, i, positions, angles)
@@ -186,24 +191,33 @@ def _count_parallelograms(order: EntryOrder, i: int) -> int:
 
 
 @compiled
-def _set_features(order: EntryOrder, i: int, c: int, positions: Int64, errors: Float64, features: Float64) -> None:
-    """Set the first two features: the mean of the neighbours' coordinates, and that of their errors; 0 and 0 without."""
-    total, error, n = 0, 0.0, 0
+def _look_around(order: EntryOrder, i: int, positions: Int64, errors: Float64, around: Float64) -> None:
+    """Set means over the neighbours, by coordinate: of coordinates, of errors, of these' magnitudes, of the own one thrice.
+
+    0, 0 and `UNKNOWN` without neighbours.
+    """
+    around[:], n = 0.0, 0
     for g in range(order.starts[i], order.starts[i + 1]):
         for k in range(2):
             other = order.gates[g, k]
             if other >= 0:
-                total += positions[other, c]
-                error += errors[other, c]
                 n += 1
-    features[0], features[1] = total / max(n, 1), error / max(n, 1)
+                sizes = abs(errors[other, 0]) + abs(errors[other, 1]) + abs(errors[other, 2])
+                for c in range(3):
+                    around[MEAN, c] += positions[other, c]
+                    around[ERROR, c] += errors[other, c]
+                    around[MAGNITUDE, c] += sizes + abs(errors[other, c])
+    for c in range(3):
+        around[MEAN, c] /= max(n, 1)
+        around[ERROR, c] /= max(n, 1)
+        around[MAGNITUDE, c] = around[MAGNITUDE, c] / (4 * n) if n else UNKNOWN
 
 
 @compiled
-def _bend(order: EntryOrder, i: int, c: int, positions: Int64, mesh: tuple[Int32, Int64, Bool]) -> float:
-    """Mean of what parallelograms over the two other edges of the triangles across the gates leave; 0 without."""
+def _bend(order: EntryOrder, i: int, positions: Int64, mesh: tuple[Int32, Int64, Bool], around: Float64) -> None:
+    """Set what parallelograms over the two other edges of the triangles across the gates leave, in the mean; 0 without."""
     flat, opposite, is_done = mesh
-    total, n = 0, 0
+    n = 0
     for g in range(order.starts[i], order.starts[i + 1]):
         o = order.gates[g, 2]
         if order.gates[g, 1] < 0 or o < 0:
@@ -214,23 +228,12 @@ def _bend(order: EntryOrder, i: int, c: int, positions: Int64, mesh: tuple[Int32
             other = previous_corner(corner) if k == 0 else next_corner(corner)
             across = opposite[own]
             if across >= 0 and is_done[flat[across]]:
-                total += positions[flat[across], c] + positions[flat[own], c] - positions[o, c] - positions[flat[other], c]
                 n += 1
-    return total / n if n else 0.0
-
-
-@compiled
-def _expect(order: EntryOrder, i: int, c: int, errors: Float64) -> float:
-    """Mean magnitude of the neighbours' errors, of coordinate c thrice."""
-    total, n = 0.0, 0
-    for g in range(order.starts[i], order.starts[i + 1]):
-        for k in range(2):
-            other = order.gates[g, k]
-            if other >= 0:
-                own = abs(errors[other, c])
-                total += abs(errors[other, 0]) + abs(errors[other, 1]) + abs(errors[other, 2]) + own
-                n += 1
-    return total / (4 * n) if n else UNKNOWN
+                a, b, third = flat[across], flat[own], flat[other]
+                for c in range(3):
+                    around[BEND, c] += positions[a, c] + positions[b, c] - positions[o, c] - positions[third, c]
+    for c in range(3 if n else 0):
+        around[BEND, c] /= n
 
 
 @compiled
@@ -255,17 +258,27 @@ def _list_numbers(learnt: _Learnt, c: int, guess: int, forecast: Forecast) -> No
     middle = guess + int(np.floor(forecast.shape[CENTRE] + 0.5))
     reach = int(min(max(REACH * forecast.shape[SCALE], LEAST_REACH), MOST_REACH))
     width = 2.0 * forecast.shape[SCALE]
+    top, bottom = min(middle + reach, REMEMBERED - 1), max(middle - reach, 0)
+    above, below = max(middle, 0), min(middle - 1, REMEMBERED - 1)
     n, total = 0, 0.0
-    for k in range(2 * reach + 1):
-        value = middle + ((k + 1) >> 1 if k & 1 else -(k >> 1))
-        if 0 <= value < REMEMBERED and learnt.present[c, value]:
-            off = (value - guess - forecast.shape[CENTRE]) / width
-            nearness = 1.0 / (1.0 + off * off)
-            forecast.listed[n], forecast.chances[n] = value - guess, nearness * nearness
-            total += nearness * nearness
-            n += 1
-            if n == MOST_LISTED:
-                break
+    while n < MOST_LISTED:
+        while above <= top and not learnt.present[c, above]:
+            above = above + 1 if learnt.rows[c, above >> ROW_BITS] else ((above >> ROW_BITS) + 1) << ROW_BITS
+        while below >= bottom and not learnt.present[c, below]:
+            below = below - 1 if learnt.rows[c, below >> ROW_BITS] else (below >> ROW_BITS << ROW_BITS) - 1
+        if above > top and below < bottom:
+            break
+        is_above = below < bottom or (above <= top and above - middle <= middle - below)
+        value = above if is_above else below
+        if is_above:
+            above += 1
+        else:
+            below -= 1
+        off = (value - guess - forecast.shape[CENTRE]) / width
+        nearness = 1.0 / (1.0 + off * off)
+        forecast.listed[n], forecast.chances[n] = value - guess, nearness * nearness
+        total += nearness * nearness
+        n += 1
     for j in range(n):
         forecast.chances[j] /= total
     forecast.size[0] = n

@@ -37,7 +37,7 @@ def code_positions(order: EntryOrder, mixing: Mixing, state: Int64, data: UInt8,
     n = len(order.order)
     residuals = np.zeros((n + MATCHED, 3), np.int64)  # in their order, behind zeros
     by_entry = np.zeros((n, 3), np.int64)
-    latest = np.full(1 << MATCH_BITS, -1, np.int64)
+    latest = np.full(1 << MATCH_BITS, -1, np.int32)
     contexts, guess, mean = np.empty(N_CONTEXTS, np.int64), np.zeros(3, np.int64), np.zeros(3, np.int64)
     match, run = -1, 0
     for i in range(n):

@@ -21,10 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gvpipe.entropy.logistic_tables import LIMIT, squash_table, stretch_table
-from gvpipe.foundation.arrays import Int64, UInt8
-from gvpipe.runtime.compiled import compiled
+from gvpipe.foundation.arrays import Int64, Integers, UInt8, UInt32
+from gvpipe.runtime.compiled import compiled, inlined
 
 ONE_BITS = 22  # of a context's probability
+SEEN_BITS = 8  # of how often a slot was used
 TOP = 1 << 24  # range below which a byte leaves
 RANGE = (1 << 32) - 1
 AHEAD = 3  # bytes that a decoder has asked for beyond the last one of a stream, at its end
@@ -37,16 +38,15 @@ class Mixing(NamedTuple):
     """What K contexts and their mixer have learnt.
 
     Args:
-        chances: ``(K, S)`` probability of a 1 in each slot of each context, in ``2**-ONE_BITS``.
-        seen: ``(K, S)`` how often the slot was used, up to a limit.
+        chances: ``(K, S)`` uint32: above `SEEN_BITS`, the probability of a 1 in each slot of each context, in ``2**-ONE_BITS``;
+            below, how often the slot was used, up to a limit.
         weights: ``(M, I + 1)`` of the mixers, one chosen per decision; 65536 is one. The last one is a bias'.
         inputs: ``(I + 1,)`` memory: logits of the K contexts, those of others if there are, and a bias.
         rates: share of an error that a slot takes, by how often it was used, in 1 / 65536.
         squash, stretch: of `gvpipe.entropy.logistic_tables`.
     """
 
-    chances: Int64
-    seen: UInt8
+    chances: UInt32
     weights: Int64
     inputs: Int64
     rates: Int64
@@ -64,8 +64,7 @@ def new_mixing(n_contexts: int, n_slots: int, n_mixers: int, limit: int = 250, n
     weights[:, -1] = 0
     rates = np.array([2 * 65536 // (2 * n + 3) for n in range(limit + 1)], np.int64)
     return Mixing(
-        np.full((n_contexts, n_slots), 1 << (ONE_BITS - 1), np.int64),
-        np.zeros((n_contexts, n_slots), np.uint8),
+        np.full((n_contexts, n_slots), 1 << (ONE_BITS - 1 + SEEN_BITS), np.uint32),
         weights,
         np.zeros(n_inputs + 1, np.int64),
         rates,
@@ -89,7 +88,7 @@ def start_decoder(data: UInt8) -> Int64:
     return state
 
 
-@compiled
+@inlined
 def put(state: Int64, out: UInt8, chance: int, bit: int) -> None:
     """Encode a decision whose 1 has probability ``chance / 65536``, 1..65535; ``out`` has room for four more bytes."""
     bound = (state[EXTENT] >> 16) * chance
@@ -126,7 +125,7 @@ def finish(state: Int64, out: UInt8) -> int:
     return int(state[PLACE] + 1)
 
 
-@compiled
+@inlined
 def take(state: Int64, data: UInt8, chance: int) -> int:
     """Decode a decision: mirror of `put`."""
     bound = (state[EXTENT] >> 16) * chance
@@ -153,8 +152,8 @@ def code_plain(state: Int64, data: UInt8, decoding: bool, bit: int) -> int:
     return bit
 
 
-@compiled
-def code_decision(mixing: Mixing, slots: Int64, mixer: int, state: Int64, data: UInt8, decoding: bool, bit: int) -> int:
+@inlined
+def code_decision(mixing: Mixing, slots: Integers, mixer: int, state: Int64, data: UInt8, decoding: bool, bit: int) -> int:
     """Code ``bit``, or decode it; then learn from it.
 
     Args:
@@ -171,22 +170,22 @@ def code_decision(mixing: Mixing, slots: Int64, mixer: int, state: Int64, data: 
     return bit
 
 
-@compiled
-def read_slots(mixing: Mixing, slots: Int64) -> None:
+@inlined
+def read_slots(mixing: Mixing, slots: Integers) -> None:
     """Set the first K inputs: the logits of the slots' probabilities."""
     for k in range(len(slots)):
-        mixing.inputs[k] = mixing.stretch[mixing.chances[k, slots[k]] >> (ONE_BITS - 12)]
+        mixing.inputs[k] = mixing.stretch[mixing.chances[k, slots[k]] >> (ONE_BITS + SEEN_BITS - 12)]
 
 
-@compiled
+@inlined
 def code_inputs(mixing: Mixing, mixer: int, rate: tuple[int, int], state: Int64, data: UInt8, decoding: bool, bit: int) -> int:
     """Code or decode a decision by the inputs alone; the mixer learns, by ``rate``: a factor, and bits to shift by."""
-    inputs, weights = mixing.inputs, mixing.weights[mixer]
+    inputs, weights = mixing.inputs, mixing.weights
     n = len(inputs) - 1
     total = 0
     inputs[n] = 256
     for k in range(n + 1):
-        total += inputs[k] * weights[k]
+        total += inputs[k] * weights[mixer, k]
     logit = min(max(total >> 16, -LIMIT), LIMIT)
     chance = mixing.squash[logit + LIMIT]
     if decoding:
@@ -195,17 +194,15 @@ def code_inputs(mixing: Mixing, mixer: int, rate: tuple[int, int], state: Int64,
         put(state, data, chance, bit)
     error = ((bit << 16) - bit) - chance
     for k in range(n + 1):
-        weights[k] += (inputs[k] * error * rate[0]) >> rate[1]
+        weights[mixer, k] += (inputs[k] * error * rate[0]) >> rate[1]
     return bit
 
 
-@compiled
-def learn_slots(mixing: Mixing, slots: Int64, bit: int) -> None:
+@inlined
+def learn_slots(mixing: Mixing, slots: Integers, bit: int) -> None:
     """Move the slots' probabilities towards ``bit``."""
     for k in range(len(slots)):
-        slot = slots[k]
-        used = mixing.seen[k, slot]
-        missing = (bit << ONE_BITS) - bit - mixing.chances[k, slot]
-        mixing.chances[k, slot] += (missing * mixing.rates[used]) >> 16
-        if used < len(mixing.rates) - 1:
-            mixing.seen[k, slot] += np.uint8(1)
+        known = np.int64(mixing.chances[k, slots[k]])
+        chance, used = known >> SEEN_BITS, known & ((1 << SEEN_BITS) - 1)
+        chance += (((bit << ONE_BITS) - bit - chance) * mixing.rates[used]) >> 16
+        mixing.chances[k, slots[k]] = chance << SEEN_BITS | min(used + 1, len(mixing.rates) - 1)

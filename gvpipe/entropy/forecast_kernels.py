@@ -16,8 +16,8 @@ import numpy as np
 
 from gvpipe.entropy.decision_kernels import Mixing, code_inputs, learn_slots, new_mixing, read_slots
 from gvpipe.entropy.number_kernels import MAX_LENGTH, MIXERS, MODELLED, NODES, SIGN, SLOT_BITS, find_slots
-from gvpipe.foundation.arrays import Float64, Int64, UInt8
-from gvpipe.runtime.compiled import compiled
+from gvpipe.foundation.arrays import Float64, Int64, UInt8, UInt32
+from gvpipe.runtime.compiled import compiled, inlined
 
 N_FORECASTS = 2
 CENTRE, SCALE, SHARE = 0, 1, 2  # of a forecast's numbers
@@ -34,12 +34,14 @@ class Forecast(NamedTuple):
         listed: ``(L,)`` numbers.
         chances: ``(L,)`` of each of them, in sum 1.
         size: ``(1,)`` how many of these count.
+        slots: ``(K,)`` memory.
     """
 
     shape: Float64
     listed: Int64
     chances: Float64
     size: Int64
+    slots: UInt32
 
 
 def new_forecast_mixing(n_contexts: int, n_groups: int) -> Mixing:
@@ -48,9 +50,11 @@ def new_forecast_mixing(n_contexts: int, n_groups: int) -> Mixing:
 
 
 @compiled
-def new_forecast(most: int) -> Forecast:
-    """Memory for forecasts with up to ``most`` listed numbers."""
-    return Forecast(np.zeros(3), np.zeros(most, np.int64), np.zeros(most), np.zeros(1, np.int64))
+def new_forecast(most: int, n_contexts: int) -> Forecast:
+    """Memory for forecasts with up to ``most`` listed numbers, beside so many contexts."""
+    return Forecast(
+        np.zeros(3), np.zeros(most, np.int64), np.zeros(most), np.zeros(1, np.int64), np.zeros(n_contexts, np.uint32)
+    )
 
 
 @compiled
@@ -74,7 +78,7 @@ def code_forecast(
         coder: state, data and whether to decode, as of `code_decision`.
         number: magnitude below ``2**MAX_LENGTH``.
     """
-    slots = np.empty(len(contexts), np.int64)
+    slots = forecast.slots
     magnitude, length = abs(number), 0
     from_low, from_high = 1.0, 0.0  # probabilities of the magnitudes from two bounds on
     while True:
@@ -183,11 +187,11 @@ def _logit(mixing: Mixing, zero: float, one: float) -> int:
     return int(mixing.stretch[min(int(part * CHANCES), CHANCES - 1)])
 
 
-@compiled
+@inlined
 def _code(
     mixing: Mixing,
     contexts: Int64,
-    slots: Int64,
+    slots: UInt32,
     node: int,
     mixer: int,
     rate: tuple[int, int],

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from gvpipe.entropy.decision_kernels import RANGE, Mixing, code_decision, code_plain, new_mixing
-from gvpipe.foundation.arrays import Int64, UInt8
+from gvpipe.foundation.arrays import Int64, UInt8, UInt32
 from gvpipe.runtime.compiled import compiled
 
 MAX_LENGTH = 40  # bits of a magnitude
@@ -50,7 +50,7 @@ def code_number(
         signed: whether there are negative numbers.
         number: magnitude below ``2**MAX_LENGTH``.
     """
-    slots = np.empty(len(contexts), np.int64)
+    slots = np.empty(len(contexts), np.uint32)
     magnitude = abs(number)
     length = 0
     while True:
@@ -80,7 +80,7 @@ def code_number(
 
 
 @compiled
-def find_slots(contexts: Int64, node: int, slots: Int64) -> None:
+def find_slots(contexts: Int64, node: int, slots: UInt32) -> None:
     """Fill ``slots (K,)``: those of the contexts for a decision's place."""
     for k in range(len(contexts)):
         slots[k] = mix_hash(contexts[k], node) >> (32 - SLOT_BITS)

@@ -189,6 +189,7 @@ export const BLOCK_CODER_PARAMETRIC = 1;
 
 // gvpipe.entropy.decision_kernels
 export const DECISION_KERNELS_ONE_BITS = 22;
+export const DECISION_KERNELS_SEEN_BITS = 8;
 export const DECISION_KERNELS_AHEAD = 3;
 export const DECISION_KERNELS_PLACE = 2;
 export const DECISION_KERNELS_RANGE = 4294967295;

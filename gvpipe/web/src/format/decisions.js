@@ -8,6 +8,7 @@ import {
   DECISION_KERNELS_ONE_BITS as ONE_BITS,
   DECISION_KERNELS_PLACE as PLACE,
   DECISION_KERNELS_RANGE as RANGE,
+  DECISION_KERNELS_SEEN_BITS as SEEN_BITS,
   FORECAST_KERNELS_N_FORECASTS as N_FORECASTS,
   LOGISTIC_TABLES_KNOTS as KNOTS,
   LOGISTIC_TABLES_LIMIT as LIMIT,
@@ -28,14 +29,13 @@ let tables = null; // made when first needed
  */
 export function newMixing(kernels, nContexts, nSlots, nMixers, nOthers = 0) {
   tables ??= makeTables();
-  const chances = kernels.array("int64", [nContexts, nSlots]);
-  kernels.view(chances).fill(1n << BigInt(ONE_BITS - 1));
+  const chances = kernels.array("uint32", [nContexts, nSlots]);
+  kernels.view(chances).fill(1 << (ONE_BITS - 1 + SEEN_BITS));
   const nInputs = nContexts + nOthers;
   const own = Math.floor((65536 * 4) / (3 * nInputs));
   const weights = Int32Array.from({ length: nMixers * (nInputs + 1) }, (_, i) => ((i + 1) % (nInputs + 1) ? own : 0));
   return [
     chances,
-    kernels.array("uint8", [nContexts, nSlots]),
     kernels.whole(weights, [nMixers, nInputs + 1]),
     kernels.array("int64", [nInputs + 1]),
     ...[tables.rates, tables.squash, tables.stretch].map((table) => kernels.array("int64", [table.length], table)),
