@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import gc
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -18,20 +17,6 @@ OPTIONS = {
     "nogil": True,
     "no_cfunc_wrapper": True,
 }  # nothing calls kernels by C pointers, and their wrappers take a tenth of compiling
-RARELY = 20_000  # objects made between two searches for garbage while a kernel is compiled; Python's own are 700 to 10,000
-
-
-class _Compiler(BorrowingCompiler):
-    """Compiling makes millions of objects, nearly all of which stay until its end: searching for garbage took a sixth of it."""
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function; numba's lock lets one thread at a time do so."""
-        often, *others = gc.get_threshold()
-        gc.set_threshold(max(often, RARELY) if often else 0, *others)  # 0: whoever runs this wants no searches
-        try:
-            return super().compile_extra(func)
-        finally:
-            gc.set_threshold(often, *others)
 
 
 def quick(function: Callable[..., Any], *, inline: bool = False, on_miss: Callable[[], None] = note_miss) -> Any:
@@ -43,7 +28,7 @@ def quick(function: Callable[..., Any], *, inline: bool = False, on_miss: Callab
         on_miss: called when there is no code for some types.
     """
     options = {**OPTIONS, "forceinline": True} if inline else OPTIONS
-    kernel: Any = numba.njit(pipeline_class=_Compiler, **options)(function)
+    kernel: Any = numba.njit(pipeline_class=BorrowingCompiler, **options)(function)
     kernel._cache = MachineCode(function, options, on_miss, announce_no_folder)  # `cache=True` sets numba's own
     kernel.get_call_template = functools.partial(_find_overload, kernel.get_call_template)
     return kernel
