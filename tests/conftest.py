@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from hypothesis import settings
 import gvpipe
 from fuzz.library_processes import fork_library_processes
 from gvpipe.cli.commands import main
+from gvpipe.foundation.cores import count_cores
 from gvpipe.io.library import process as library_process
 from gvpipe.model.sequence import MeshSequence
 
@@ -24,12 +27,24 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 # settings that cost little, for tests of anything but coding
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 2, "gop": 4}  # few clusters: the rest takes pictures
+gc.set_threshold(20_000, 10, 10)  # tests that are collected stay: looking through them for garbage took a third of the time
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each process that a test starts would compile all sources anew
 start_process = library_process.start_process
 fork_library_processes()  # USD, Alembic and FBX files then take no start of Python each
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--write-golden", action="store_true", help="write the golden files of the current codec versions")
+
+
+@pytest.hookimpl(optionalhook=True)  # without pytest-xdist nobody asks
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One more than cores for quick tests: some wait, for time to pass or for a kernel that another worker compiles."""
+    return count_cores() + int(config.getoption("markexpr") == "not slow")
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
 
 
 @dataclass(frozen=True)

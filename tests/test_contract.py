@@ -66,13 +66,13 @@ CHOSEN = {
     for settings in SETTINGS.get(codec, [{}])
 }
 VARIANTS = [pytest.param(*variant, id=name) for name, variant in CHOSEN.items()]
-AWKWARD_CASES = [  # codecs meet every second input, in one of both orders; with settings every fourth; others in the slow run
+AWKWARD_CASES = [  # codecs meet every second input, in one of both orders; with settings every eighth; others in the slow run
     pytest.param(
         *variant.values,
         reorder,
         name,
         id=f"{variant.id}-{'reorder' if reorder else ''}-{name}",
-        marks=[] if (i + j) % (4 if variant.values[1] else 2) == 0 and reorder == (i // 2 + j // 2) % 2 else pytest.mark.slow,
+        marks=[] if (i + j) % (8 if variant.values[1] else 2) == 0 and reorder == (i // 2 + j // 2) % 2 else pytest.mark.slow,
     )
     for (i, variant), reorder, (j, name) in product(enumerate(VARIANTS), (False, True), enumerate(AWKWARD))
 ]

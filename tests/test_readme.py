@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from folders import ROOT
+from folders import ROOT, SAMPLES
 
 import gvpipe
 from gvpipe.cli.commands import cli
@@ -59,6 +59,9 @@ def test_examples_of_assets(in_a_copy: Path, capsys: pytest.CaptureFixture[str])
 
 def test_set_up_line_ends_in_commands_that_run(in_a_copy: Path) -> None:
     line = next(line for line in README.splitlines() if "gvpipe encode samples" in line)
+    (in_a_copy / "samples").unlink()
+    (in_a_copy / "samples").mkdir()
+    gvpipe.write(gvpipe.read(SAMPLES / "creature.npz").part(0, 12), in_a_copy / "samples" / "creature.npz")
     commands = [shlex.split(part) for part in line.split("&&") if "bin/gvpipe " in part]
     assert [command[1] for command in commands] == ["encode", "decode"]
     for command in commands:

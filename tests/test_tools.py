@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,19 +10,24 @@ import pytest
 from folders import ROOT
 
 TOOLS = sorted((ROOT / "tools").glob("*.py"))
-SCRIPTS = [  # a process each; those that measure are left to the slow run
+SCRIPTS = [  # those that measure are left to the slow run
     pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem.startswith("measure_") else []) for path in TOOLS
 ]
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
-def test_help(script: Path, tmp_path: Path) -> None:
+def test_help(script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """It names the script and its first sentence, and nothing is measured or written."""
-    done = subprocess.run([sys.executable, script, "--help"], capture_output=True, text=True, cwd=tmp_path)
-    assert done.returncode == 0 and done.stderr == ""
-    assert done.stdout.startswith(f"usage: {script.name}")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(script.parent)
+    monkeypatch.setattr(sys, "argv", [str(script), "--help"])
+    with pytest.raises(SystemExit) as stopped:
+        runpy.run_path(str(script), run_name="__main__")
+    out, err = capfd.readouterr()
+    assert not stopped.value.code and err == ""
+    assert out.startswith(f"usage: {script.name}")
     summary = script.read_text("utf-8").split('"""')[1].splitlines()[0]
-    assert summary in done.stdout
+    assert summary in out
     assert list(tmp_path.iterdir()) == []
 
 

@@ -42,6 +42,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("kglpc", {"taps": 0}),
     ("maverg", {"predictor": "motion"}),
     ("cpca", {"clusters": 3, "components": 0}),
+    ("famc", {"clusters": 0}),
     ("rlpca", {"clusters": 2}),
     ("tls", {"levels": 0}),
 ]

@@ -139,6 +139,7 @@ def test_every_kind_of_field_is_python_s(longest: int, tmp_path: Path, monkeypat
     assert job.run(tmp_path) == ""
 
 
+@pytest.mark.slow
 def test_fields_of_a_sample_are_python_s(tmp_path: Path) -> None:
     gvpipe.encode(SAMPLES / "flag.npz", tmp_path / "flag.mp4", preset="fast")
     with Player(tmp_path / "flag.mp4") as video:

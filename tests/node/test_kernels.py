@@ -111,6 +111,7 @@ def test_kernels_equal_numba_on_laplacians(name: str, tmp_path: Path) -> None:
 
 
 @NODE
+@pytest.mark.slow
 def test_kernels_equal_numba_on_a_sample(tmp_path: Path) -> None:
     gvpipe.encode(SAMPLES / "flag.npz", tmp_path / "flag.mp4", preset="fast")
     with recorded() as calls, gvpipe.open(tmp_path / "flag.mp4") as video:
