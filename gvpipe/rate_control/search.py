@@ -20,7 +20,7 @@ from gvpipe.rate_control.trials import Trial, Trials
 if TYPE_CHECKING:
     from gvpipe.asset_coding.encoder import AssetCoder
 
-SMALL_SEQUENCE = 250_000  # positions: any encode takes little
+SMALL_SEQUENCE = 250_000  # positions, times the codec's effort: an encode takes little
 
 
 class TooLarge(Exception):
@@ -71,7 +71,7 @@ def meet(
         return Choice(trial, trials, tried, reason)
     trials = Trials(codec, sequence, target.largest, progress, asset, is_bare)
     attempt = trials if target.measure == "bpvf" else _GivingUp(trials, target, most)
-    is_small = sequence.n_frames * sequence.n_vertices <= SMALL_SEQUENCE
+    is_small = codec.effort * sequence.n_frames * sequence.n_vertices <= SMALL_SEQUENCE
     closeness = CHEAP if codec.is_cheap_again else SMALL if is_small else DEAR
     trial, tried = find_quality(attempt, target, _start(target, codec, sequence), closeness)
     found = target.of(trial)
