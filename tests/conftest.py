@@ -27,7 +27,7 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.load_profile("same")
 # settings that cost little, for tests of anything but coding
 FAST: dict[str, Any] = {"preset": "ultrafast", "clusters": 2, "gop": 4}  # few clusters: the rest takes pictures
-gc.set_threshold(20_000, 10, 10)  # tests that are collected stay: looking through them for garbage took a third of the time
+gc.set_threshold(20_000, 10, 10)  # tests that are collected stay, and need no search for garbage
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each process that a test starts would compile all sources anew
 start_process = library_process.start_process
 fork_library_processes()  # USD, Alembic and FBX files then take no start of Python each

@@ -105,15 +105,14 @@ def hub() -> Bitstream:
     return changed("laplacian-1-tutte", sections=sections, n_vertices=n, n_triangles=n - 2)
 
 
-def wheel() -> Bitstream:
-    """Two hubs over a rim of 100,000 points, each of which takes sides from both when it leaves the hierarchy."""
-    n = 100_000
+def wheel(name: str, n: int, turn: int) -> Bitstream:
+    """Two hubs over a rim of n points, each of which takes sides from both; ``turn`` -1: triangles the other way round."""
     rim = np.arange(n)
     halves = [np.stack([rim, np.roll(rim, -1), np.full(n, n)]), np.stack([np.roll(rim, -1), rim, np.full(n, n + 1)])]
-    faces = np.concatenate(halves, axis=1).T.astype(np.int32)
+    faces = np.concatenate(halves, axis=1)[::turn].T.astype(np.int32)
     coded, _ = encode_mesh(faces, np.arange(n + 2), reorder=True)
     sections = {"mesh": coded.mesh, "order": coded.order}
-    return changed("pca-1-kalman", sections=sections, n_vertices=n + 2, n_triangles=2 * n)
+    return changed(name, sections=sections, n_vertices=n + 2, n_triangles=2 * n)
 
 
 def huge_pictures() -> Bitstream:
@@ -195,7 +194,8 @@ BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "much fill": (partial(much_fill, "laplacian-1-tutte"), "TooMuchFill: .*points at random"),
     "much fill of the average": (partial(much_fill, "laplacian-1"), "TooMuchFill: .*points at random"),
     "a hub": (hub, "OverBudget: .*factoring over 40000 points"),
-    "a wheel": (wheel, "OverBudget: .*section 'basis.0'"),
+    "a wheel": (partial(wheel, "pca-1-kalman", 100_000, 1), "OverBudget: .*section 'basis.0'"),
+    "a traversed wheel": (partial(wheel, "pca-1-first", 100_000, -1), "CorruptFile: .*coefficients.0"),
     "a long clip": (long_clip, "OverBudget: .*100000 frames"),
     "long transforms": (long_transforms, "OverBudget: .*16777216 frames"),
     "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),

@@ -73,11 +73,11 @@ class Front(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Candidates for one vertex, in the order in which they were found; int32.
+    """Candidates for one vertex, in the order in which they were found; all but ``keys`` int32.
 
     Args:
         vertices, relations: ``(MOST,)``.
-        keys: ``(MOST,)`` int64: the chance of the relations, and how many were found later; -1 of a candidate that was tried.
+        keys: ``(MOST,)`` int64: the chance of the relations, and a place, the first highest; -1 of a candidate that was tried.
         places: ``(V,)`` of a vertex among candidates; -1: none.
         sources: ``(S,)`` times of visits whose neighbours are candidates, in the order in which they were found.
         marks: ``(V,)`` by time of a visit: relations that its neighbours have, 0 for no source.

@@ -104,7 +104,12 @@ def _append_around(v: int, tail: int, lists: CornerLists, queue: _Queue) -> int:
 
 @compiled
 def _opposite(a: int, b: int, lists: CornerLists, triangles: Int32, is_done: Bool) -> int:
-    """The third vertex of the first triangle at the edge a b of which that is done; -1 without one."""
+    """The third vertex of the first triangle at the edge a b of which that is done; -1 without one.
+
+    All triangles at the edge are around both, in one order. The vertex with fewer is looked at: around hubs it would take long.
+    """
+    if lists.starts[b + 1] - lists.starts[b] < lists.starts[a + 1] - lists.starts[a]:
+        a, b = b, a
     for c in lists.corners[lists.starts[a] : lists.starts[a + 1]]:
         after, before = triangles[c // 3, (c + 1) % 3], triangles[c // 3, (c + 2) % 3]
         third = before if after == b else after if before == b else -1

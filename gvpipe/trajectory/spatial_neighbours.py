@@ -22,7 +22,7 @@ from gvpipe.runtime.ahead import halves, run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
 
 PEAK_PER_VERTEX, PEAK_PER_TRIANGLE = 520, 40  # bytes, of `parallelogram_order`
-SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 2e-6, 0.5e-6
+SECONDS_PER_VERTEX, SECONDS_PER_TRIANGLE = 2e-6, 1e-6
 
 if TYPE_CHECKING:
     from gvpipe.mesh.hierarchy_kernels import Hierarchy

@@ -44,8 +44,9 @@ def test_made_sequences_have_the_error_of_their_quality(codec: str, name: str, q
 def test_real_sequences_have_the_error_of_their_quality(codec: str, name: str) -> None:
     sequence = gvpipe.read(DATA / f"{name}.npz")
     parts = {quality: part_of_the_error(sequence, codec, quality) for quality in QUALITIES}
-    least = 0.65 if (codec, name) == ("mcgv", "morph_wave") else 0.8  # at quality 90 each point moves with one cluster
-    assert all(least <= part <= 1.2 for part in parts.values()), parts
+    if (codec, name) == ("mcgv", "morph_wave"):  # at quality 90 each point moves with one cluster: a finer error costs little
+        assert 0.65 <= parts.pop(90) < 0.8
+    assert all(0.8 <= part <= 1.2 for part in parts.values()), parts
 
 
 def test_the_scale() -> None:

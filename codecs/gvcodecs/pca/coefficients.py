@@ -10,6 +10,7 @@ Along a traversal, errors of rounding would grow. So first components are rounde
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,8 @@ from gvpipe.trajectory.trellis import GRADES
 from gvpipe.trajectory.trellis_search import PENALTY
 
 MOST_FIRST = 16  # components
-FIRST_STEP = (
-    0.9  # of first components, in D: as fine as steps of blocks are on average (`gvpipe.trajectory.trellis.block_steps`)
-)
+# of first components, in D: as fine as steps of blocks are on average (`gvpipe.trajectory.trellis.block_steps`)
+FIRST_STEP = 0.9
 MARGIN = 0.1  # bits of a first component of a point that must be saved
 
 
@@ -50,24 +50,38 @@ def encode_coefficients(wanted: Float64, step: float, orders: Orders, given: Flo
         step: D, model units.
         orders: of the points that are coded.
         given: ``(n, R)`` of points that the orders leave out.
+
+    Raises:
+        InputError: a value is too large for the step.
     """
     n_first = _choose(wanted, step, orders, given)
     if not n_first:
         return varint(0) + encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES)[0]
-    begun = _columns(wanted, n_first), _given(given, n_first)
-    data, known = encode_vectors(begun[0], FIRST_STEP * step, orders.first, "kalman", 0.0, begun[1], PENALTY, rounds=True)
+    first_wanted, first_given = _columns(wanted, n_first), _given(given, n_first)
+    how = "kalman", 0.0, first_given, PENALTY
+    data, known = encode_vectors(first_wanted, FIRST_STEP * step, orders.first, *how, rounds=True)
     rest, _ = encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES, known=known)
     return varint(n_first) + pack_block(data) + rest
 
 
 def decode_coefficients(
-    data: bytes, n_components: int, step: float, orders: Orders, name: str, n_blocks: int | None, given: Float64 | None
+    data: bytes,
+    n_components: int,
+    step: float,
+    causal: CausalOrder,
+    find_first: Callable[[], CausalOrder],
+    *,
+    name: str,
+    n_blocks: int | None,
+    given: Float64 | None,
 ) -> Float64:
     """Mirror of `encode_coefficients`; returns coefficients ``(n, R)`` of all points.
 
     Args:
-        data, step, orders, given: as there.
+        data, step, given: as there.
         n_components: R.
+        causal: the order along the hierarchy.
+        find_first: makes that along a traversal, which is kept no longer than it is needed.
         name: of the section, for messages.
         n_blocks: as of `gvpipe.trajectory.coefficient_coding.decode_vectors`.
 
@@ -77,10 +91,9 @@ def decode_coefficients(
     cursor, known = Cursor(data, name), None
     n_first = cursor.varint(min(MOST_FIRST, n_components), "the number of first components")
     if n_first:
-        known = decode_vectors(
-            cursor.block(), n_first, FIRST_STEP * step, orders.first, name, given=_given(given, n_first), rounds=True
-        )
-    return decode_vectors(cursor.rest(), n_components, step, orders.causal, name, n_blocks, given=given, known=known)
+        first_given = _given(given, n_first)
+        known = decode_vectors(cursor.block(), n_first, FIRST_STEP * step, find_first(), name, given=first_given, rounds=True)
+    return decode_vectors(cursor.rest(), n_components, step, causal, name, n_blocks, given=given, known=known)
 
 
 def _choose(wanted: Float64, step: float, orders: Orders, given: Float64 | None) -> int:

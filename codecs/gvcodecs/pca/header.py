@@ -53,5 +53,5 @@ class Header:
         predictor = fields.choice("predictor", PREDICTORS)
         has_first = fields.flag("first")
         if has_first and predictor != "kalman":
-            raise fields.wrong("first", "false, but for predictor kalman,")
+            raise fields.wrong("first", f"false with predictor {predictor}")
         return cls(predictor, fields.number("beta", 0.1, 1.99), segments, read_steps(bitstream, segments), has_first)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gvcodecs.pca.coefficients import Orders, decode_coefficients
+from gvcodecs.pca.coefficients import decode_coefficients
 from gvcodecs.pca.header import Header
 from gvpipe.connectivity.topology_only import Topology, open_mesh
 from gvpipe.container.bitstream import Bitstream
@@ -109,9 +109,8 @@ class PcaReader:
             data, n_components = self._bitstream.section(name), basis.vectors.shape[1]
             n_blocks = self._count_blocks(lod) if lod else None
             if self._header.has_first:
-                orders = Orders(self._first_order(), self._causal)
-                coefficients = decode_coefficients(data, n_components, step, orders, name, n_blocks, given)
-                del orders  # what follows takes memory, too
+                orders = self._causal, self._first_order
+                coefficients = decode_coefficients(data, n_components, step, *orders, name=name, n_blocks=n_blocks, given=given)
             else:
                 how = self._header.predictor, self._header.beta, given
                 coefficients = decode_vectors(data, n_components, step, self._causal, name, n_blocks, *how)

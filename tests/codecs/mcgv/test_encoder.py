@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from folders import SAMPLES
 from sequences import grid, waving
 
 import gvpipe
@@ -22,8 +23,6 @@ from gvpipe.coding.registry import open_reader
 from gvpipe.container import bitstream
 from gvpipe.metrics.vertex_errors import measure_errors
 from gvpipe.model.sequence import MeshSequence
-
-ROBOT = Path(__file__).parents[3] / "samples" / "robot.npz"
 
 
 @pytest.mark.parametrize("scale", [1e-38, 1e-30, 1e-10, 1e10, 1e30, 3e37])
@@ -124,7 +123,7 @@ def test_a_blend_asked_for_again_is_the_same() -> None:
 
 def test_rigid_parts_have_one_error_at_all_qualities(tmp_path: Path) -> None:
     """Files of the sample robot, whose parts are rigid, are about the same below quality 90."""
-    robot = gvpipe.read(ROBOT)
+    robot = gvpipe.read(SAMPLES / "robot.npz")
     files = []
     for quality in (50, 80):
         n_bytes = gvpipe.encode(robot, tmp_path / "a.mp4", quality=quality).bytes

@@ -1,6 +1,8 @@
-"""Coefficients of which some come first: back within a step, at less bytes; damage is refused."""
+"""Coefficients of which some come first: back with as little error, in fewer bytes; damage is refused."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,15 +31,21 @@ def sheet() -> tuple[Orders, np.ndarray]:
     return orders, np.concatenate([shape, motion], axis=1)
 
 
+def decoded_of(data: bytes, orders: Orders, n_blocks: int | None = None, given: np.ndarray | None = None) -> np.ndarray:
+    """Coefficients (n, 7)."""
+    how: dict[str, Any] = {"name": "coefficients.0", "n_blocks": n_blocks, "given": given}
+    return decode_coefficients(data, 7, STEP, orders.causal, lambda: orders.first, **how)
+
+
 def test_first_components_take_fewer_bytes_and_come_back() -> None:
     orders, wanted = sheet()
     data = encode_coefficients(wanted, STEP, orders, None)
     alone, decoded = encode_vectors(wanted, STEP, orders.causal, penalty=PENALTY, flags=GRADES)
-    found = decode_coefficients(data, 7, STEP, orders, "x", None, None)
+    found = decoded_of(data, orders)
     assert data[0] >= 3
     assert len(data) < 0.9 * len(alone)
     assert np.square(found - wanted).mean() < 1.3 * np.square(decoded - wanted).mean()
-    part = decode_coefficients(data, 7, STEP, orders, "x", 3, None)
+    part = decoded_of(data, orders, n_blocks=3)
     known = orders.causal.order[: orders.causal.blocks[3]]
     assert np.array_equal(part[known], found[known])
 
@@ -49,7 +57,7 @@ def test_points_that_are_given_are_neighbours() -> None:
     held = np.arange(len(wanted)) % 5 == 0
     left = Orders(leave_out(orders.first, held), leave_out(orders.causal, held))
     data = encode_coefficients(wanted, STEP, left, wanted)
-    found = decode_coefficients(data, 7, STEP, left, "x", None, wanted)
+    found = decoded_of(data, left, given=wanted)
     assert data[0] > 0
     assert np.array_equal(found[held], wanted[held])
     assert np.abs(found - wanted).max() < 2 * STEP
@@ -61,8 +69,8 @@ def test_damage_is_refused() -> None:
     plain, _ = encode_vectors(wanted[:, :2], STEP, orders.first)
     for damaged, message in (
         (varint(8) + data[1:], "the number of first components"),
-        (data[:60], "x"),
+        (data[:60], "coefficients.0"),
         (varint(2) + pack_block(plain) + data, "its residuals are not on a trellis"),
     ):
         with pytest.raises(CorruptFile, match=message):
-            decode_coefficients(damaged, 7, STEP, orders, "x", None, None)
+            decoded_of(damaged, orders)

@@ -244,7 +244,8 @@ def test_damage_is_noticed_or_harmless() -> None:
             except FormatError:
                 continue
             assert frames.shape == (5, 196, 3)
-    for key, value in (("predictor", "x"), ("segments", 0), ("steps", []), ("steps", [0.0]), ("beta", "a")):
+    wrong = {"predictor": "x", "segments": 0, "beta": "a", "first": 1}
+    for key, value in (*wrong.items(), ("steps", []), ("steps", [0.0])):
         header = {**bitstream.header, key: value}
         with pytest.raises(FormatError):
             decode(dataclasses.replace(bitstream, header=header))

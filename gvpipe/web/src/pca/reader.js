@@ -143,9 +143,9 @@ export class PcaReader {
     const basis = decodeBasis(kernels, sections[0], frameCount, this.#still.movingCount, steps[s], `basis.${s}`, 3, budget);
     const isReversed = predictor === "lsp"; // the small ones come first
     const given = this.#given(kernels, basis, isReversed);
-    const orders = [this.#header.hasFirst ? this.#firstOrder(kernels) : null, placed(kernels, this.#causal)];
+    const orders = [placed(kernels, this.#causal), this.#header.hasFirst ? () => this.#firstOrder(kernels) : null];
     const how = { predictor, beta, given, blocks: level ? this.#countBlocks(level) : null };
-    const vectors = coefficientSteps(kernels, orders, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
+    const vectors = coefficientSteps(kernels, ...orders, sections[1], basis.components, steps[s], `coefficients.${s}`, how);
     const decoded = await inSlices(vectors, () => !job.isUrgent && this.#isUrgent);
     const chosen = level ? this.#alive(level) : null;
     return new Segment(this.#kernels.fresh(), basis, kernels.view(decoded), this.#topology.pointCount, isReversed, { chosen });

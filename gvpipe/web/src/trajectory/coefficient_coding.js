@@ -65,12 +65,12 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   const onTrellis = flags !== null;
   if ((known || rounds) && !onTrellis) throw cursor.corrupt("its residuals are not on a trellis");
   if (flags && predictor !== "kalman") throw cursor.corrupt("its flags are those of the predictor kalman");
-  if (onTrellis && rest.length === 1 && n * coded > 0) throw cursor.corrupt("it has no words");
-  const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const wanted = blocks ?? bounds.shape[0] - 1;
+  const vectors = kernels.view(bounds)[wanted];
+  if (onTrellis && rest.length === 1 && vectors * coded > 0) throw cursor.corrupt("it has no words");
+  const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const decoded = given ?? kernels.array("float64", [n, components]);
   const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
-  const vectors = kernels.view(bounds)[wanted];
   const residuals = kernels.array("int64", [vectors, coded]);
   const state = [residuals, kernels.array("int64", [coded, vectors]), kernels.array("int64", [coded], usual)];
   for (let b = 0; b < wanted; b++) {
