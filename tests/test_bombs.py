@@ -195,7 +195,7 @@ BOMBS: dict[str, tuple[Callable[[], Bitstream], str]] = {
     "much fill of the average": (partial(much_fill, "laplacian-1"), "TooMuchFill: .*points at random"),
     "a hub": (hub, "OverBudget: .*factoring over 40000 points"),
     "a wheel": (partial(wheel, "pca-1-kalman", 100_000, 1), "OverBudget: .*section 'basis.0'"),
-    "a traversed wheel": (partial(wheel, "pca-1-first", 60_000, -1), "CorruptFile: .*coefficients.0"),
+    "a traversed wheel": (partial(wheel, "pca-1-first", 58_000, -1), "CorruptFile: .*coefficients.0"),
     "a long clip": (long_clip, "OverBudget: .*100000 frames"),
     "long transforms": (long_transforms, "OverBudget: .*16777216 frames"),
     "many runs": (many_runs, "OverBudget: .*16777216 distinct frames"),
