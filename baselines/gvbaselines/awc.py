@@ -64,7 +64,7 @@ class Awc(Baseline):
         if len(frames) == 1:
             return data
         wavelets = find_wavelets(memo("hierarchy", lambda: build_hierarchy(mesh.point_faces, mesh.n_points)), base)
-        steps = step / norms(wavelets)
+        steps = step / level_norms(wavelets)
         moved = (frames[1:] - origin - base).swapaxes(0, 1).reshape(mesh.n_points, -1)  # (P, 3(n - 1))
         numbers = quantise(analyse(moved, wavelets) / steps[wavelets.levels, None], 1.0)
         residuals = np.diff(numbers.reshape(mesh.n_points, -1, 3), axis=1, prepend=0).reshape(mesh.n_points, -1)
@@ -151,12 +151,12 @@ def ring_weights(points: Float64, rings: Float64) -> Float64:
 
 
 def analyse(values: Float64, wavelets: Wavelets) -> Float64:
-    """Details of ``values (P, m)``."""
+    """Details ``(P, m)`` of ``values (P, m)``."""
     return np.asarray(values - wavelets.weights @ values)
 
 
 def synthesise(details: Float64, wavelets: Wavelets) -> Float64:
-    """Mirror of `analyse`."""
+    """Mirror of `analyse`: values ``(P, m)`` of ``details (P, m)``."""
     values = details.copy()
     for level in range(1, int(wavelets.levels.max()) + 1):
         points = np.flatnonzero(wavelets.levels == level)
@@ -164,8 +164,8 @@ def synthesise(details: Float64, wavelets: Wavelets) -> Float64:
     return values
 
 
-def norms(wavelets: Wavelets) -> Float64:
-    """The norm of the synthesis functions of each level, by one sum of all of them with random signs."""
+def level_norms(wavelets: Wavelets) -> Float64:
+    """The norms ``(L,)`` of the synthesis functions of each level, by one sum of all of them with random signs."""
     counts = np.bincount(wavelets.levels)
     signs = np.random.default_rng(SEED).choice([-1.0, 1.0], len(wavelets.levels))
     made = synthesise((wavelets.levels[:, None] == np.arange(len(counts))) * signs[:, None], wavelets)

@@ -18,14 +18,13 @@ import numpy as np
 
 from gvbaselines.numbers import STEP, decode_columns, encode_columns, multiples, quantise, read_step
 from gvbaselines.parallelogram import residuals_of, traversal_of, values_of
+from gvbaselines.plain_basis import PER_OCTAVE, find_scales, read_scales
 from gvpipe.connectivity.topology_only import Topology
 from gvpipe.container.cursor import Cursor, varint
 from gvpipe.foundation.arrays import Float64, Int64
 from gvpipe.trajectory.basis import Basis, choose_step, count_components, find_principal, fit_coefficients
 
 MAX_COMPONENTS = 4096
-MAX_SCALE = 8 * 120
-PER_OCTAVE = 8
 
 
 @dataclass(frozen=True)
@@ -46,8 +45,7 @@ def code_basis(frames: Float64, mesh: Topology, error: float) -> CodedBasis:
         principal, squared, lambda step: count_components(principal, len(frames), step), sum(rows.shape) / 12
     )
     kept = min(kept, MAX_COMPONENTS)
-    scales = np.rint(PER_OCTAVE * np.log2(np.sqrt(principal.energies[:kept]))).astype(np.int64)
-    scales = np.clip(scales, -MAX_SCALE, MAX_SCALE)
+    scales = find_scales(principal.energies[:kept])
     columns = np.column_stack([principal.mean, principal.vectors[:, :kept]]) * _factors(scales, len(frames))
     values = quantise(columns, step)
     residuals = residuals_of(values.reshape(mesh.n_points, -1), traversal_of(mesh))  # (3P, 1 + R) -> (P, 3 (1 + R))
@@ -59,9 +57,7 @@ def read_basis(cursor: Cursor, mesh: Topology, n_frames: int) -> tuple[Basis, fl
     """Mirror of `code_basis`: the basis and its step; raises `CorruptFile`."""
     step = read_step(cursor)
     kept = cursor.varint(min(MAX_COMPONENTS, n_frames), "the number of components")
-    scales = cursor.array("<i2", kept).astype(np.int64)
-    if (np.abs(scales) > MAX_SCALE).any():
-        raise cursor.corrupt("a scale is out of range")
+    scales = read_scales(cursor, kept)
     residuals = decode_columns(cursor, mesh.n_points, 3 * (1 + kept))
     values = values_of(residuals, traversal_of(mesh)).reshape(3 * mesh.n_points, 1 + kept)
     return _basis(multiples(values, step), scales, n_frames), step

@@ -64,7 +64,7 @@ class Tls(Baseline):
         """Code a segment; see `Baseline.code_frames`."""
         step = STEP_PER_ERROR * error
         bands = memo("bands", lambda: split(frames, levels_of(len(frames), self.levels)))
-        steps = step / np.array(norms(len(bands) - 1))
+        steps = step / np.array(subband_norms(len(bands) - 1))
         coarse, *details = (quantise(band, one) for band, one in zip(bands, steps, strict=True))
         left = np.diff(coarse, axis=0, prepend=0)
         left[0] = residuals_of(coarse[0], traversal_of(mesh))
@@ -80,7 +80,7 @@ class Tls(Baseline):
         cursor.end()
         bands[0][0] = values_of(bands[0][0], traversal_of(mesh))
         bands[0] = np.cumsum(bands[0], axis=0)
-        steps = step / np.array(norms(n_levels))
+        steps = step / np.array(subband_norms(n_levels))
         return join([multiples(band, one) for band, one in zip(bands, steps.tolist(), strict=True)])
 
 
@@ -125,7 +125,7 @@ def join(bands: list[Float64]) -> Float64:
 
 
 @lru_cache(MAX_LEVELS + 1)
-def norms(n_levels: int) -> tuple[float, ...]:
+def subband_norms(n_levels: int) -> tuple[float, ...]:
     """How large the root of the squared error is that one coefficient of each subband makes, the coarsest first."""
     sizes = band_sizes(REFERENCE << n_levels, n_levels)
     found = []

@@ -15,13 +15,12 @@ from odd_headers import first_payload
 from sequences import awkward, same_triangles, waving
 from shapes import ball
 
-from gvbaselines.awc import analyse, find_wavelets, norms, ring_weights, synthesise
+from gvbaselines.awc import analyse, find_wavelets, level_norms, ring_weights, synthesise
 from gvbaselines.baseline import Baseline
 from gvbaselines.famc import LADDER, START, find_count
 from gvbaselines.rlpca import localised, placed
 from gvbaselines.square_map import map_to_square
-from gvbaselines.tls import join, levels_of, split
-from gvbaselines.tls import norms as band_norms
+from gvbaselines.tls import join, levels_of, split, subband_norms
 from gvbaselines.wavelets import decode_levels, encode_levels, restore, transform
 from gvcodecs.pdct.local_frames import local_frames
 from gvpipe.coding.codec import Encoded
@@ -189,7 +188,7 @@ def test_the_lifting_scheme_leaves_no_detail_of_cubic_motion() -> None:
 
 def test_norms_of_subbands_are_those_of_their_errors() -> None:
     rng, sizes = np.random.default_rng(8), [64, 64, 128, 256]
-    for band, norm in enumerate(band_norms(3)):
+    for band, norm in enumerate(subband_norms(3)):
         bands = [rng.normal(0, 1, (size, 50, 1)) * (k == band) for k, size in enumerate(sizes)]
         assert np.square(join(bands)).sum() == pytest.approx(norm**2 * sizes[band] * 50, rel=0.1)
 
@@ -213,7 +212,7 @@ def test_wavelets_on_a_mesh_give_back_values() -> None:
     values = np.random.default_rng(5).normal(0, 1, (len(points), 4))
     assert wavelets.levels.max() > 3
     assert np.allclose(synthesise(analyse(values, wavelets), wavelets), values)
-    assert norms(wavelets)[0] > 1.5 * norms(wavelets)[-1] == pytest.approx(1.5)
+    assert level_norms(wavelets)[0] > 1.5 * level_norms(wavelets)[-1] == pytest.approx(1.5)
 
 
 def test_local_frames_take_rigid_motion_out() -> None:

@@ -23,10 +23,9 @@ def test_selected_rows_know_what_they_knew() -> None:
 def test_parallelograms_predict_planes_exactly() -> None:
     """On a plane sheet, vertices that end a parallelogram follow from it; weights sum to one; neighbours come before."""
     side = 9
-    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(side), np.arange(side)))
-    i = np.arange(side * side).reshape(side, side)
-    a, b, c, d = i[:-1, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel()
-    causal = parallelogram_order(np.concatenate([np.c_[a, b, c], np.c_[b, d, c]]).astype(np.int32), side * side)
+    points, faces = grid(side)
+    x, y = (side - 1) * points[:, :2].T
+    causal = parallelogram_order(faces, side * side)
     rank = np.empty(side * side, int)
     rank[causal.order] = np.arange(side * side)
     exact = 0

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sequences import grid
 
 from gvcodecs.pca.coefficients import Orders, decode_coefficients, encode_coefficients
 from gvpipe.container.cursor import pack_block, varint
@@ -21,10 +22,8 @@ SIDE, STEP = 24, 0.01
 
 def sheet() -> tuple[Orders, np.ndarray]:
     """Orders of a wavy sheet, and coefficients (n, 7), of which three are its shape."""
-    x, y = (axis.ravel() / SIDE for axis in np.meshgrid(np.arange(SIDE), np.arange(SIDE)))
-    i = np.arange(SIDE * SIDE).reshape(SIDE, SIDE)
-    a, b, c, d = i[:-1, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel()
-    faces = np.concatenate([np.c_[a, b, c], np.c_[b, d, c]]).astype(np.int32)
+    points, faces = grid(SIDE)
+    x, y = points[:, 0], points[:, 1]
     shape = np.c_[9 * x, 9 * y + np.sin(7 * x), np.sin(9 * x * y)]
     motion = np.stack([np.sin(k * x + y) / k for k in range(2, 6)], axis=1)
     orders = Orders(parallelogram_order(faces, SIDE * SIDE), hierarchy_order(build_hierarchy(faces, SIDE * SIDE)))
