@@ -50,12 +50,13 @@ def decode_plain(cursor: Cursor, n_frames: int, n_points: int, step: float) -> B
 
 def find_scales(energies: Float64) -> Int64:
     """Scales ``(R,)`` of principal vectors, in 1 / `PER_OCTAVE` of an octave, from their energies ``(R,)``."""
-    return np.clip(np.rint(PER_OCTAVE * np.log2(np.sqrt(energies))).astype(np.int64), -MAX_SCALE, MAX_SCALE)
+    scales = np.rint(PER_OCTAVE * np.log2(np.sqrt(energies))).astype(np.int64)
+    return np.asarray(np.clip(scales, -MAX_SCALE, MAX_SCALE))
 
 
 def read_scales(cursor: Cursor, kept: int) -> Int64:
     """Read ``kept`` scales, int16 each; raises `CorruptFile`."""
-    scales: Int64 = cursor.array("<i2", kept).astype(np.int64)
+    scales = cursor.array("<i2", kept).astype(np.int64)
     if (np.abs(scales) > MAX_SCALE).any():
         raise cursor.corrupt("a scale is out of range")
     return scales
