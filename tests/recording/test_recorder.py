@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -231,6 +233,16 @@ def test_transforms_that_are_none() -> None:
         body.positions({"a": np.eye(3)})
 
 
+@pytest.fixture
+def _garbage_as_usual() -> Iterator[None]:
+    """Python searches for garbage as often as outside of the tests."""
+    before = gc.get_threshold()
+    gc.set_threshold(700, 10, 10)
+    yield
+    gc.set_threshold(*before)
+
+
+@pytest.mark.usefixtures("_garbage_as_usual")
 def test_memory_does_not_grow_with_frames(tmp_path: Path) -> None:
     """Of many frames with a field no more is held than of one clip, until the file is made whole."""
     import tracemalloc
