@@ -139,6 +139,7 @@ def test_unlike_files_stay_as_they_are(folder: Path, tmp_path: Path) -> None:
     assert _members(tmp_path / "few.tar")["0.mp4"] == (folder / "s0.mp4").read_bytes()
 
 
+@pytest.mark.slow
 def test_pictures_come_back(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     sheet = waving(25, 4)

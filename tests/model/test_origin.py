@@ -214,6 +214,7 @@ def test_reordered_vertices_are_matched_there(tmp_path: Path) -> None:
     assert 0 < errors.max() < 3
 
 
+@pytest.mark.slow
 def test_a_bound_is_kept_there(tmp_path: Path) -> None:
     report = gvpipe.encode(sheet(FAR), tmp_path / "bound.mp4", max_error=1e-4)
     decoded = gvpipe.decode(tmp_path / "bound.mp4").read_absolute(0, 40)

@@ -37,7 +37,7 @@ CHANGES = {
     "rows are no vectors": "import gvpipe.runtime.vector_rows as m; m._vector = lambda lanes: None",
     "a result is wrong": "import operator, gvpipe.runtime.vector_rows as m; m.OPERATORS[operator.mul] = 'fadd'",
 }
-QUICKLY_TESTED = ("a result is wrong",)
+QUICKLY_TESTED = ("a private name is gone",)  # which compiles nothing
 
 
 def _run(folder: Path, change: str = "", **variables: str) -> subprocess.CompletedProcess[str]:

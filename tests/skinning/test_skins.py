@@ -276,6 +276,7 @@ def test_a_skeleton_is_found_for_a_sequence(tmp_path: Path) -> None:
     assert farthest(gvpipe.read(tmp_path / "a.glb").read(0, len(frames)), frames) < 1e-3
 
 
+@pytest.mark.slow
 def test_corrective_shapes_add_what_joints_leave(tmp_path: Path, run: Any) -> None:
     """Few joints hold the error with shapes; every reader and engine shows what the skin says."""
     sequence = wrinkled()
@@ -412,6 +413,7 @@ def bent_arm() -> MeshSequence:
     return replace(tube, positions=np.array(frames, np.float32))
 
 
+@pytest.mark.slow
 def test_rigid_joints_turn_and_hang_together(tmp_path: Path) -> None:
     """Nothing is sheared; each joint is one node below its parent, and engines show what the skin says."""
     sequence = bent_arm()

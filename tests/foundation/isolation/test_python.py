@@ -53,7 +53,7 @@ COMMANDS = [
     "info scene.usda",
     "info few.abc",
     "info part.inp",
-    "encode-all few.npz scene.usda out --workers 2 --codec pca",
+    pytest.param("encode-all few.npz scene.usda out --workers 2 --codec pca", marks=pytest.mark.slow),
     "encode few.npz b.mp4 --set prediction=affine --set placement=charts",
     pytest.param("encode few.npz a.mp4 --codec pca --workers 2 --segment 2", marks=pytest.mark.slow),
     pytest.param("bench few.npz --codecs pca --qualities 50 --json c.json", marks=pytest.mark.slow),

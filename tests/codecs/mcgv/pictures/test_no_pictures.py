@@ -84,6 +84,7 @@ def test_a_target_is_met_with_no_finer_error(sequence: MeshSequence, tmp_path: P
     assert sum(map(len, sought.sections.values())) < sum(map(len, plain.sections.values()))
 
 
+@pytest.mark.slow
 def test_a_bound_is_kept(sequence: MeshSequence, tmp_path: Path) -> None:
     gvpipe.encode(sequence, tmp_path / "a.mp4", max_error="0.05%")
     assert gvpipe.info(tmp_path / "a.mp4").settings["pictures"] is False
