@@ -33,7 +33,7 @@ CODECS: dict[str, dict[str, Any]] = {
 def stream(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A file of ten segments, too large for the first request."""
     path = tmp_path_factory.mktemp("stream") / "a.mp4"
-    gvpipe.encode(waving(60, 200), path, stream=True, **CODECS[request.param])
+    gvpipe.encode(waving(84, 200), path, stream=True, **CODECS[request.param])
     assert path.stat().st_size > 5 << 15
     return path.read_bytes()
 
