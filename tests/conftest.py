@@ -18,7 +18,6 @@ from hypothesis import settings
 import gvpipe
 from fuzz.library_processes import fork_library_processes
 from gvpipe.cli.commands import main
-from gvpipe.foundation.cores import count_cores
 from gvpipe.io.library import process as library_process
 from gvpipe.model.sequence import MeshSequence
 
@@ -35,12 +34,6 @@ fork_library_processes()  # USD, Alembic and FBX files then take no start of Pyt
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--write-golden", action="store_true", help="write the golden files of the current codec versions")
-
-
-@pytest.hookimpl(optionalhook=True)  # without pytest-xdist nobody asks
-def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """One more than cores for quick tests: some wait, for time to pass or for a kernel that another worker compiles."""
-    return count_cores() + int(config.getoption("markexpr") == "not slow")
 
 
 def pytest_collection_finish() -> None:
