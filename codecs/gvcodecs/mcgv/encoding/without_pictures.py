@@ -128,9 +128,7 @@ def _choose_base(
         if lattice_step < TUNING.rebased_by * trials.candidate.start.lattice.step:
             continue
         others = StepTrials(job, rebase(job, trials.candidate, trial.step, coarsest * target_error))
-        other = _find(others, trial.step, target_error, close_enough)
-        if other.error <= target_error and cost(other) < cost(trial):
-            trials, trial = others, other
+        trials, trial = _smaller(trials, trial, others, target_error, close_enough)
     return trials, trial
 
 
@@ -147,12 +145,19 @@ def _fit_on_base(
         others = _fit_anew(trials, change * trial.step, part * target_error)
         if others.candidate.fitted is trials.candidate.fitted:
             continue
-        other, misses = _find(others, trial.step, target_error, close_enough), misses + 1
-        if other.error <= target_error and cost(other) < cost(trial):
-            trials, trial, misses = others, other, 0
+        trials, trial = _smaller(trials, trial, others, target_error, close_enough)
+        misses = 0 if trials is others else misses + 1
         if misses == MISSES:
             break
     return trials, trial
+
+
+def _smaller(
+    trials: StepTrials, trial: StepTrial, others: StepTrials, target_error: float, close_enough: tuple[float, float]
+) -> tuple[StepTrials, StepTrial]:
+    """An encode that meets a target error, or one of other trials that does so with fewer bytes; and the trials it is of."""
+    other = _find(others, trial.step, target_error, close_enough)
+    return (others, other) if other.error <= target_error and cost(other) < cost(trial) else (trials, trial)
 
 
 def _fit_anew(trials: StepTrials, step: float, target_error: float) -> StepTrials:
