@@ -28,7 +28,7 @@ const PAGE = 65536;
 const HEADER = 64; // bytes before the data of what kernels allocate
 const SMALL = 1 << 20; // bytes; below, sizes are powers of two
 const ALIGNMENT = 64;
-const WAIT = 500; // ms, until memory is asked for once more
+const WAITS = [250, 500, 1000, 2000, 4000]; // ms, until memory is asked for again: a busy browser gives it back late
 const RESULT = 1024; // bytes; a tuple of ten arrays takes fewer
 
 const modules = new WeakMap(); // bytes -> promise of what they compile to: instances share machine code
@@ -50,12 +50,14 @@ export class Kernels {
   static async open(bytes) {
     if (!modules.has(bytes)) modules.set(bytes, WebAssembly.compile(bytes).catch((error) => Promise.reject(refused(error))));
     const module = await modules.get(bytes);
-    try {
-      return new Kernels(module);
-    } catch (error) {
-      if (!(error instanceof RangeError)) throw error;
+    for (const wait of WAITS) {
+      try {
+        return new Kernels(module);
+      } catch (error) {
+        if (!(error instanceof RangeError)) throw error;
+      }
+      await new Promise((resolve) => setTimeout(resolve, wait)); // memories of workers that ended are given back some time later
     }
-    await new Promise((resolve) => setTimeout(resolve, WAIT)); // memories of workers that ended are given back some time later
     return new Kernels(module);
   }
 
