@@ -319,8 +319,8 @@ def _choose(
         candidates.keys[place] = -1
         y, relation = candidates.vertices[place], candidates.relations[place]
         alike = 0
-        for j in range(place):  # those found later have the same chance, and come later
-            alike += 1 if candidates.relations[j] == relation else 0
+        for j in range(count):  # those found later have the same chance, and come later
+            alike += 1 if j < place and candidates.relations[j] == relation else 0
         kind = mix_hash(mix_hash(8, relation), alike)
         is_expected = 1 if kind == expected else 0
         shape = 8 * min(around[y], 7) + min(lists.starts[y + 1] - lists.starts[y] - around[y], 7)

@@ -13,7 +13,7 @@ import numpy as np
 
 from gvpipe.entropy.decision_kernels import RANGE, Mixing, code_decision, code_plain, new_mixing
 from gvpipe.foundation.arrays import Int64, UInt8, UInt32
-from gvpipe.runtime.compiled import compiled
+from gvpipe.runtime.compiled import compiled, inlined
 
 MAX_LENGTH = 40  # bits of a magnitude
 MODELLED = 3  # bits below the highest that contexts predict; lower ones are alike
@@ -29,7 +29,7 @@ def new_number_mixing(n_contexts: int, n_groups: int) -> Mixing:
     return new_mixing(n_contexts, 1 << SLOT_BITS, MIXERS * n_groups)
 
 
-@compiled
+@inlined
 def mix_hash(value: int, other: int) -> int:
     """A hash below 2**32 of one, and of any integer of a magnitude below 2**31."""
     mixed = ((int(value) ^ (int(other) & RANGE)) * FACTOR) & RANGE  # 64 bits may wrap round: the lower 32 stay

@@ -21,17 +21,18 @@ def row_order(clusters: Int32, weights: Int32, n_clusters: int) -> CausalOrder:
 
     ``clusters`` and ``weights (P, 4)`` are those of `gvcodecs.mcgv.motion.skinning.Weights`.
     """
-    shared, neighbours, starts = count_shared(clusters, weights, n_clusters), list[int](), [0]
-    for k in range(n_clusters):
-        before = shared[k, :k]
-        near = np.argsort(-before, kind="stable")[:MOST]  # of equals the lower number
-        near = near[before[near] > 0]
-        for i in range(4):
-            neighbours += [*(4 * near + i).tolist(), *range(4 * k, 4 * k + i)]
-            starts.append(len(neighbours))
+    before = np.tril(count_shared(clusters, weights, n_clusters), -1)  # (K, K)
+    near = np.argsort(-before, axis=1, kind="stable")[:, :MOST]  # of equals the lower number
+    row, most = np.arange(4), near.shape[1]
+    neighbours, used = np.empty((n_clusters, 4, most + 4), np.int32), np.empty((n_clusters, 4, most + 4), np.bool_)
+    neighbours[..., :most] = 4 * near[:, None] + row[:, None]
+    used[..., :most] = np.take_along_axis(before, near, axis=1)[:, None] > 0
+    neighbours[..., most:] = 4 * np.arange(n_clusters)[:, None, None] + row
+    used[..., most:] = row < row[:, None]
+    starts, neighbours = np.concatenate([[0], np.cumsum(used.sum(axis=2))]), neighbours[used]
     return independent_order(4 * n_clusters)._replace(
-        starts=np.array(starts, np.int32),
-        neighbours=np.array(neighbours, np.int32),
+        starts=starts.astype(np.int32),
+        neighbours=neighbours,
         weights=np.zeros(len(neighbours)),
         variances=np.full(len(neighbours), VARIANCE),
     )
