@@ -73,11 +73,12 @@ class Front(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Candidates for one vertex, in the order in which they were found; all but ``keys`` int32.
+    """Candidates for one vertex, in the order in which they were found; all but ``keys`` and ``tried`` int32.
 
     Args:
         vertices, relations: ``(MOST,)``.
         keys: ``(MOST,)`` int64: the chance of the relations, and a place, the first highest; -1 of a candidate that was tried.
+        tried: ``(MOST,)`` int64: the keys of those that were tried, in that order.
         places: ``(V,)`` of a vertex among candidates; -1: none.
         sources: ``(S,)`` times of visits whose neighbours are candidates, in the order in which they were found.
         marks: ``(V,)`` by time of a visit: relations that its neighbours have, 0 for no source.
@@ -87,6 +88,7 @@ class Candidates(NamedTuple):
     vertices: Int32
     relations: Int32
     keys: Int64
+    tried: Int64
     places: Int32
     sources: Int32
     marks: Int32
@@ -165,6 +167,7 @@ def code_by_candidates(
     candidates = Candidates(
         np.zeros(MOST, np.int32),
         np.zeros(MOST, np.int32),
+        np.zeros(MOST, np.int64),
         np.zeros(MOST, np.int64),
         np.full(n, -1, np.int32),
         np.zeros(n_sources, np.int32),
@@ -318,9 +321,11 @@ def _choose(
         place = LAST_PLACE - (highest & LAST_PLACE)
         candidates.keys[place] = -1
         y, relation = candidates.vertices[place], candidates.relations[place]
-        alike = 0
-        for j in range(count):  # those found later have the same chance, and come later
-            alike += 1 if j < place and candidates.relations[j] == relation else 0
+        alike, j = 0, i - 1  # those with the same relations have the same chance
+        while j >= 0 and candidates.tried[j] >> PLACE_BITS == highest >> PLACE_BITS:
+            alike += 1 if candidates.relations[LAST_PLACE - (candidates.tried[j] & LAST_PLACE)] == relation else 0
+            j -= 1
+        candidates.tried[i] = highest
         kind = mix_hash(mix_hash(8, relation), alike)
         is_expected = 1 if kind == expected else 0
         shape = 8 * min(around[y], 7) + min(lists.starts[y + 1] - lists.starts[y] - around[y], 7)
