@@ -52,6 +52,8 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "pca-1-order": ("pca", {"quantiser": "plain"}),
     "pca-1-rbf": ("pca", {"predictor": "rbf"}),
     "pca-1-seams": ("pca", {"quantiser": "plain"}),
+    "pca-1-trends": ("pca", {"quality": 90}),
+    "pca-1-trends-still": ("pca", {"quality": 95, "segment": 9}),
     "pca-1-still": ("pca", {"quantiser": "plain", "segment": 7}),
     "pdct-1": ("pdct", {"clusters": 3, "segment": 5, "reorder": True}),
     "pdct-1-asset": ("pdct", {}),

@@ -37,7 +37,11 @@ from gvpipe.tasks.executor import WorkerDied
 
 FOLDER = Path(__file__).parents[1] / "docs" / "benchmarks" / "curves"
 QUALITIES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 100.0)
-MORE = ("pca:predictor=rbf", "dynapack:predictor=replica")  # settings beside those of `gvpipe bench`
+MORE = (
+    "pca:predictor=rbf",
+    "dynapack:predictor=replica",
+    "dynapack:predictor=space",  # stands for Touma and Gotsman frame by frame
+)  # settings beside those of `gvpipe bench`
 LIBRARIES = ("numpy", "scipy", "av", "DracoPy")
 DIGITS = 5
 LEFT_OUT = ("sections",)  # of points

@@ -87,13 +87,14 @@ SHARED = {
     "gvpipe.trajectory.basis": "MAX_COMPONENTS MAX_SCALE PER_OCTAVE LEAST_OUTSIDE BYTES_PER_VALUE SECONDS_PER_VALUE "
     "BYTES_PER_ROW",
     "gvpipe.trajectory.coefficient_coding": "MAX_VALUES MOST_FLAGS",
-    "gvpipe.trajectory.contexts": "PER_OCTAVE MAX_LEVEL N_CONTEXTS",
+    "gvpipe.trajectory.contexts": "PER_OCTAVE MAX_LEVEL N_CONTEXTS TREND_POWERS",
     "gvpipe.trajectory.prediction": "PREDICTORS",
     "gvpipe.trajectory.still_points": "SECTION BYTES_PER_STILL SECONDS_PER_STILL SECONDS_PER_PRODUCT",
     "gvpipe.trajectory.temporal_neighbours": "MAX_NEIGHBOURS MORE_NEIGHBOURS VARIANCE MORE_VARIANCE MIN_BLOCK "
     "CUBIC LINEAR OFFSETS",
     "gvpipe.trajectory.spatial_neighbours": "PEAK_PER_VERTEX PEAK_PER_TRIANGLE SECONDS_PER_VERTEX SECONDS_PER_TRIANGLE",
-    "gvpipe.trajectory.trellis": "FINENESS PARTS ZEROS SHAPES GRADES FINDS_NOISES FALL LEAST_GRADE",
+    "gvpipe.trajectory.trellis": "FINENESS PARTS ZEROS SHAPES TREND_ZEROS TREND_SHAPES GRADES FINDS_NOISES WHAT FALL "
+    "LEAST_GRADE",
     "gvcodecs.laplacian.average_coding": "NAME SPACING FARTHEST",
     "gvcodecs.laplacian.anchors": "ANCHOR_CHOICES",
     "gvcodecs.laplacian.delta_rows": "DELTA_PREDICTIONS N_CAUSAL N_RING",

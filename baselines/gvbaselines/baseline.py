@@ -128,6 +128,8 @@ class Baseline(BaseCodec):
             frames = trajectories.reshape(len(trajectories), -1, 3).swapaxes(0, 1)  # (P, 3n) -> (n, P, 3)
             try:
                 sections[f"frames.{s}"] = self.code_frames(np.ascontiguousarray(frames), shared.mesh, error, memos[s])
+            except InputError:  # says itself what it cannot code
+                raise
             except ValueError as exc:
                 raise InputError(f"{self.id} cannot code {sequence.name} so finely: {exc}; ask for a lower quality") from exc
         return self._bitstream(sequence, {"segments": len(bounds) - 1, **self.header()}, sections)

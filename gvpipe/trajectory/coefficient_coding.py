@@ -15,7 +15,9 @@ which picks one of `N_CONTEXTS` frequency tables::
     level   = of the component's mean magnitude m: the largest with 2 ** (level / 4) <= 64 m + 1
 
 Residuals on a trellis (`gvpipe.trajectory.trellis`) have the same levels and blocks. Their stream is [varint] flags, then
-words; its tables learn (`gvpipe.trajectory.trellis_coding`).
+words; its tables learn (`gvpipe.trajectory.trellis_coding`). Their forecast has powers of its own for a basis, for first
+components and for those that follow (`gvpipe.trajectory.contexts.TREND_POWERS`). Trends, which follow a vector's components one
+by one, take the place of spans, and what earlier blocks have left of a component's mean counts, too.
 """
 
 from __future__ import annotations
@@ -30,13 +32,22 @@ from gvpipe.entropy.integers import decode_integers, encode_integers
 from gvpipe.foundation.arrays import Float64, Int32, Int64, Integers
 from gvpipe.runtime.ahead import run_ahead
 from gvpipe.trajectory.causal_order import CausalOrder
-from gvpipe.trajectory.contexts import MAX_LEVEL, N_CONTEXTS, Residuals, check_residuals, context_inputs, level_of
+from gvpipe.trajectory.contexts import (
+    MAX_LEVEL,
+    N_CONTEXTS,
+    REST,
+    Residuals,
+    check_residuals,
+    context_inputs,
+    level_of,
+    no_means,
+)
 from gvpipe.trajectory.prediction import predict_vectors, start_vectors
-from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, PARTS, block_steps, find_noises
+from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, PARTS, WHAT, block_steps, find_noises
 from gvpipe.trajectory.trellis_coding import TrellisDecoder, encode_numbers
 from gvpipe.trajectory.trellis_search import search
 
-MOST_FLAGS = GRADES | FINDS_NOISES  # in place of the number of contexts: flags of residuals on a trellis, at most
+MOST_FLAGS = GRADES | FINDS_NOISES | REST << WHAT  # of residuals on a trellis, in place of the number of contexts
 MAX_VALUES = 1 << 27  # of a section: vectors times components
 PART, MOST_PARTS = 4096, 16  # vectors whose residuals are decoded before they are predicted, about; parts of all of them
 
@@ -99,12 +110,14 @@ def encode_vectors(
 def _encode_trellis(
     target: Float64, causal: CausalOrder, found: tuple[Int64, Int64, Float64], flags: int
 ) -> tuple[bytes, Float64]:
-    """As `encode_vectors`, of what was found on the trellis (`search`)."""
+    """As `encode_vectors`, of what was found on the trellis (`search`): in contexts by trends or by spans, what is smaller."""
     numbers, ranked, decoded = found
     check_residuals(ranked)
-    levels = level_of(ranked)
-    words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1))
-    return pack_block(encode_integers(np.diff(levels, prepend=0))) + varint(flags) + words, decoded
+    levels, streams = level_of(ranked), []
+    for what in {flags >> WHAT, 0}:
+        words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1, what))
+        streams.append(varint(flags % (1 << WHAT) | what << WHAT) + words)
+    return pack_block(encode_integers(np.diff(levels, prepend=0))) + min(streams, key=len), decoded
 
 
 def decode_vectors(
@@ -148,14 +161,15 @@ def decode_vectors(
         raise cursor.corrupt("its residuals are not on a trellis")
     if flags and predictor != "kalman":
         raise cursor.corrupt("its flags are those of the predictor kalman")
-    coder = BlockDecoder(rest, N_CONTEXTS, name) if flags is None else TrellisDecoder(rest[1:], name)
+    what = (flags or 0) >> WHAT
+    coder = BlockDecoder(rest, N_CONTEXTS, name) if flags is None else TrellisDecoder(rest[1:], what > 0, name)
     steps = block_steps(step if flags is None else step * FINENESS, len(causal.blocks) - 1, flags or 0).tolist()
     wanted = len(causal.blocks) - 1 if n_blocks is None else n_blocks
     n_vectors = int(causal.blocks[wanted])
     decoded = start_vectors((len(causal.order), n_components), given, known)
-    inputs = context_inputs(causal, len(decoded), levels, wanted)
+    inputs = context_inputs(causal, len(decoded), levels, wanted, what)
     ranked, rows = np.zeros((n_vectors, n_coded), np.int64), np.zeros((n_coded, n_vectors), np.int64)
-    residuals = Residuals(ranked, rows, inputs.usual.copy())
+    residuals = Residuals(ranked, rows, no_means(inputs))
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
         """Decode the residuals of blocks, and return these."""

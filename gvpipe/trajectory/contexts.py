@@ -25,6 +25,20 @@ POWER_ONE = 20
 LOWEST, HIGHEST = -10, 16  # contexts, half octaves above magnitude one
 N_CONTEXTS = HIGHEST - LOWEST + 1
 N_NEAR = 6  # causal neighbours that count
+BASIS, FIRST, REST = 1, 2, 3  # what is coded, each with powers of its own: a basis, first components, those that follow
+TREND_POWERS = (  # of the mean, what is left of it, the block before, the neighbours, the short, the long, the relative trend
+    (),  # contexts by spans, as above
+    (6, 6, 4, 7, 9, -2, 11),
+    (11, 3, 4, 2, 9, -4, 4),
+    (11, 5, 1, 4, 2, 12, 4),
+)
+TREND_SHIFTS = (2, 5, 3)  # a trend comes nearer to what is new by 1 / 2 ** shift: the short, the long, the relative one
+TREND_BITS = 6  # of trends, beyond those of magnitudes
+FLOOR_TREND = 128  # added to trends
+LEAST_USUAL = 8  # mean magnitude that a relative one counts from, in 1 / ONE
+MIDDLE = 279  # of a level, which is rounded down: 2 ** (1 / 8), in 1 / 256
+LEAST_LEFT = 4  # what is left of a mean is at least 1 / 2 ** LEAST_LEFT of it
+MOST_LEFT = 1 << 48  # what a hostile file may have
 
 
 class ContextInputs(NamedTuple):
@@ -37,6 +51,7 @@ class ContextInputs(NamedTuple):
         usual: ``(R,) int64`` mean magnitudes of the components, in 1 / ONE.
         roots: int64, ``2 ** (i / 16)`` rounded down.
         logs: int64, of the smallest numbers, in 1 / PER_OCTAVE: looked up, not searched for.
+        powers: int64, one of `TREND_POWERS`.
     """
 
     blocks: Int32
@@ -47,6 +62,7 @@ class ContextInputs(NamedTuple):
     usual: Int64
     roots: Int64
     logs: Int64
+    powers: Int64
 
 
 class Residuals(NamedTuple):
@@ -55,7 +71,7 @@ class Residuals(NamedTuple):
     Args:
         ranked: ``(m, R)`` by rank, for predictors.
         rows: ``(R, m)`` for contexts, which read one component at a time: magnitudes in 1 / ONE, above a bit for the sign.
-        means: ``(R,)`` magnitudes of the last block, in 1 / ONE; before the first, `ContextInputs.usual`.
+        means: ``(2, R)`` in 1 / ONE (`no_means`): mean magnitudes of the last block, and sums of those of all blocks.
     """
 
     ranked: Int64
@@ -63,7 +79,12 @@ class Residuals(NamedTuple):
     means: Int64
 
 
-def context_inputs(causal: CausalOrder, n_vectors: int, levels: Int64, n_blocks: int) -> ContextInputs:
+def no_means(inputs: ContextInputs) -> Int64:
+    """`Residuals.means` before the first block: `ContextInputs.usual`, and zeros."""
+    return np.stack([inputs.usual, np.zeros_like(inputs.usual)])
+
+
+def context_inputs(causal: CausalOrder, n_vectors: int, levels: Int64, n_blocks: int, what: int = 0) -> ContextInputs:
     """Return the inputs for the first ``n_blocks`` blocks.
 
     Args:
@@ -71,12 +92,14 @@ def context_inputs(causal: CausalOrder, n_vectors: int, levels: Int64, n_blocks:
         n_vectors: n, given vectors counted.
         levels: ``(R,)`` levels of the components' mean magnitudes (`level_bounds`).
         n_blocks: 0..B.
+        what: is coded: 0, or `BASIS`, `FIRST` or `REST`.
     """
     rank = np.full(n_vectors, len(causal.order), np.int32)  # given vectors: behind all blocks, so that they count for 0
     rank[causal.order] = np.arange(len(causal.order), dtype=np.int32)
     given = (causal.blocks[: n_blocks + 1], causal.starts, causal.neighbours, causal.ring_sizes)
     blocks, starts, neighbours, ring_sizes = (np.ascontiguousarray(array, np.int32) for array in given)
-    return ContextInputs(blocks, rank, starts, neighbours, ring_sizes, level_bounds()[levels], _roots(), _logs())
+    usual, powers = level_bounds()[levels], np.array(TREND_POWERS[what], np.int64)
+    return ContextInputs(blocks, rank, starts, neighbours, ring_sizes, usual, _roots(), _logs(), powers)
 
 
 @functools.cache

@@ -26,6 +26,7 @@ from gvpipe.trajectory.contexts import N_CONTEXTS
 FINENESS = 21 / 32  # of a step
 PARTS = 16  # of a fine step, to which decoded components are rounded along orders where rounding of sums would grow
 GRADES, FINDS_NOISES = 1, 2  # flags of a stream: steps by block (`block_steps`), noises by component (`find_noises`)
+WHAT = 2  # bits of flags below what is coded (`gvpipe.trajectory.contexts.TREND_POWERS`)
 FALL, LEAST_GRADE = 0.96, 5 / 8  # of a block's step, in that of the next; in that of the last
 N_STATES, N_QUANTISERS = 8, 2
 FEEDBACK, PARITY = 5, 2  # of the code: state s leads to ``(s >> 1) ^ FEEDBACK (s & 1) ^ PARITY (k & 1)``
@@ -34,6 +35,11 @@ ZEROS = (  # first tables (`parametric_tables.table`): of each quantiser, by the
     (255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1),
 )
 SHAPES = (0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 6, 8, 10, 12, 14, 17, 19, 21, 23, 24, 25, 26, 27, 28, 29)
+TREND_ZEROS = (  # the same where contexts follow trends
+    (255, 254, 252, 249, 243, 236, 228, 213, 190, 163, 130, 101, 77, 58, 43, 32, 24, 17, 12, 9, 7, 5, 4, 4, 3, 3, 2),
+    (254, 246, 238, 224, 207, 185, 159, 134, 108, 83, 66, 50, 39, 28, 21, 15, 12, 9, 6, 5, 4, 3, 2, 2, 2, 2, 1),
+)
+TREND_SHAPES = (0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 3, 5, 6, 8, 10, 13, 15, 18, 20, 22, 23, 25, 26, 27, 27, 28, 29)
 
 
 def block_steps(step: float, n_blocks: int, flags: int) -> Float64:
@@ -71,14 +77,14 @@ def find_noises(before: Int64, step: float, flags: int, n_known: int = 0) -> Flo
 
 
 @functools.cache
-def _first_tables() -> Int64:
+def _first_tables(follows_trends: bool) -> Int64:
     tables = np.ones((N_CONTEXTS, N_QUANTISERS, MAX_TOKENS), np.int64)
-    for context, shape in enumerate(SHAPES):
-        for quantiser, zeros in enumerate(ZEROS):
+    for context, shape in enumerate(TREND_SHAPES if follows_trends else SHAPES):
+        for quantiser, zeros in enumerate(TREND_ZEROS if follows_trends else ZEROS):
             tables[context, quantiser, : parametric_tables.N_TOKENS] = parametric_tables.table(zeros[context], shape)
     return tables.reshape(N_CONTEXTS * N_QUANTISERS, MAX_TOKENS)
 
 
-def first_tables() -> Int64:
-    """Frequencies ``(54, MAX_TOKENS)`` that the contexts begin with; context 2 c + q is c with quantiser q."""
-    return _first_tables().copy()
+def first_tables(follows_trends: bool) -> Int64:
+    """Frequencies ``(54, MAX_TOKENS)`` that contexts, by spans or trends, begin with; context 2 c + q is c with quantiser q."""
+    return _first_tables(follows_trends).copy()

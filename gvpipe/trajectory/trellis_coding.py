@@ -7,7 +7,7 @@ import numpy as np
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.block_coder import check_end, check_status
 from gvpipe.foundation.arrays import Int64
-from gvpipe.trajectory.contexts import ContextInputs, Residuals
+from gvpipe.trajectory.contexts import ContextInputs, Residuals, no_means
 from gvpipe.trajectory.trellis import first_tables
 
 
@@ -18,8 +18,8 @@ def encode_numbers(numbers: Int64, inputs: ContextInputs) -> bytes:
     from gvpipe.trajectory.trellis_kernels import code_residuals
 
     m, n_components = numbers.shape
-    residuals = Residuals(numbers, np.zeros((n_components, m), np.int64), inputs.usual.copy())
-    state, words, tables = range_encoder.start(), np.zeros(0, np.uint32), first_tables()
+    residuals = Residuals(numbers, np.zeros((n_components, m), np.int64), no_means(inputs))
+    state, words, tables = range_encoder.start(), np.zeros(0, np.uint32), first_tables(len(inputs.powers) > 0)
     for b in range(len(inputs.blocks) - 1):
         room = range_encoder.MOST_WORDS * n_components * int(inputs.blocks[b + 1] - inputs.blocks[b]) + 1
         words = np.concatenate([words[: int(state[2])], np.zeros(room, np.uint32)])
@@ -32,13 +32,14 @@ class TrellisDecoder:
 
     Args:
         data: the words.
+        follows_trends: how contexts are found.
         name: of the section, for messages.
 
     Raises:
         CorruptFile: these are no whole words.
     """
 
-    def __init__(self, data: bytes, name: str) -> None:
+    def __init__(self, data: bytes, follows_trends: bool, name: str) -> None:
         from gvpipe.entropy import range_decoder
         from gvpipe.entropy.learning_kernels import LearningStream
 
@@ -46,7 +47,7 @@ class TrellisDecoder:
         if len(data) % 4:
             raise self._cursor.corrupt("its words are not whole")
         words = np.frombuffer(data, "<u4").astype(np.uint32)
-        self._stream = LearningStream(range_decoder.start(words), words, first_tables())
+        self._stream = LearningStream(range_decoder.start(words), words, first_tables(follows_trends))
 
     def take(self, residuals: Residuals, inputs: ContextInputs, first_block: int, end_block: int) -> None:
         """Decode residuals of blocks, those before ``first_block`` being done; raises `CorruptFile` if they do not decode."""

@@ -36,7 +36,7 @@ def code_residuals(
     Returns:
         0, or what is wrong: as of `gvpipe.entropy.learning_kernels.code_block`, or OUT_OF_RANGE.
     """
-    memory = new_memory(inputs.blocks, first_block, end_block)
+    memory = new_memory(inputs, first_block, end_block)
     block, states = new_block_memory(len(memory.contexts), stream), np.zeros(len(memory.contexts), np.int64)
     ranked, rows, means = residuals
     for b in range(first_block, end_block):

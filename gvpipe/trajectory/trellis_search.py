@@ -22,7 +22,7 @@ from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.contexts import check_residuals, context_inputs, level_of
 from gvpipe.trajectory.prediction import predict_vectors, start_vectors
-from gvpipe.trajectory.trellis import FINENESS, PARTS, block_steps, find_noises, first_tables
+from gvpipe.trajectory.trellis import FINENESS, PARTS, WHAT, block_steps, find_noises, first_tables
 
 BASIS_PENALTY, PENALTY = 0.25, 0.22  # of a bit that do best: of a basis, of coefficients
 N_PRICED = 64  # magnitudes that have a price of their own
@@ -68,7 +68,8 @@ def search(
     check_residuals(plain)  # what follows holds for smaller ones alone
     ranked = np.rint(plain * (1 / FINENESS)).astype(np.int64)
     check_residuals(ranked)
-    inputs = context_inputs(causal, len(target), level_of(ranked), len(causal.blocks) - 1)
+    what = flags >> WHAT
+    inputs = context_inputs(causal, len(target), level_of(ranked), len(causal.blocks) - 1, what)
     contexts, numbers = find_all_contexts(ranked, inputs), np.zeros(shape, np.int64)
     weights = np.zeros((0, 0)) if factor is None else factor
     for before, begin, end, own in blocks:
@@ -76,16 +77,16 @@ def search(
         fine = own * FINENESS
         unit = fine / PARTS if rounds else 0.0
         coding = VectorCoding(causal, fine, residuals, found, target, noises, unit)
-        search_paths(coding, contexts, _prices(), penalty, weights, begin, end, numbers)
+        search_paths(coding, contexts, _prices(what > 0), penalty, weights, begin, end, numbers)
         if rounds:  # the search's sums have another order
             predict_vectors(causal, fine, residuals, found, None, "kalman", 0.0, begin, end, noises, unit)
     return numbers, residuals, found
 
 
 @functools.cache
-def _prices() -> Float64:
+def _prices(follows_trends: bool) -> Float64:
     """Bits ``(54, N_PRICED)`` of magnitudes of k in each context, the sign counted."""
-    tables = first_tables()
+    tables = first_tables(follows_trends)
     tokens, _, _ = tokenise(np.arange(N_PRICED))
     bits = log2(tables.sum(axis=1, keepdims=True)) - log2(tables[:, tokens]) + N_EXTRA[tokens]
     return np.asarray(np.rint(PRICE_ONE * bits) / PRICE_ONE)

@@ -20,8 +20,9 @@ from gvpipe.foundation.arrays import Float64
 from gvpipe.foundation.elementary import log2
 from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.coefficient_coding import decode_vectors, encode_vectors
+from gvpipe.trajectory.contexts import FIRST, REST
 from gvpipe.trajectory.prediction import predict_vectors, start_vectors
-from gvpipe.trajectory.trellis import GRADES
+from gvpipe.trajectory.trellis import GRADES, WHAT
 from gvpipe.trajectory.trellis_search import PENALTY
 
 MOST_FIRST = 16  # components
@@ -55,12 +56,13 @@ def encode_coefficients(wanted: Float64, step: float, orders: Orders, given: Flo
         InputError: a value is too large for the step.
     """
     n_first = _choose(wanted, step, orders, given)
+    flags = GRADES | REST << WHAT
     if not n_first:
-        return varint(0) + encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES)[0]
+        return varint(0) + encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=flags)[0]
     first_wanted, first_given = _columns(wanted, n_first), _given(given, n_first)
     how = "kalman", 0.0, first_given, PENALTY
-    data, known = encode_vectors(first_wanted, FIRST_STEP * step, orders.first, *how, rounds=True)
-    rest, _ = encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=GRADES, known=known)
+    data, known = encode_vectors(first_wanted, FIRST_STEP * step, orders.first, *how, flags=FIRST << WHAT, rounds=True)
+    rest, _ = encode_vectors(wanted, step, orders.causal, "kalman", 0.0, given, PENALTY, flags=flags, known=known)
     return varint(n_first) + pack_block(data) + rest
 
 

@@ -35,10 +35,11 @@ from gvpipe.trajectory.causal_order import CausalOrder
 from gvpipe.trajectory.causal_selection import leave_out
 from gvpipe.trajectory.coded_points import code_connectivity, read_trajectories
 from gvpipe.trajectory.coefficient_coding import encode_vectors
+from gvpipe.trajectory.contexts import BASIS
 from gvpipe.trajectory.prediction import PREDICTORS
 from gvpipe.trajectory.spatial_neighbours import parallelogram_order
 from gvpipe.trajectory.still_points import SECTION, StillPoints, code_still
-from gvpipe.trajectory.trellis import FINDS_NOISES, GRADES, block_steps
+from gvpipe.trajectory.trellis import FINDS_NOISES, GRADES, WHAT, block_steps
 from gvpipe.trajectory.trellis_search import BASIS_PENALTY
 
 QUANTISERS = ("trellis", "plain")
@@ -193,7 +194,7 @@ def _trellis_settings(still: StillPoints, causal: CausalOrder, n_frames: int) ->
         "noise": NOISE,
         "point_noise": NOISE * mean,
         "penalty": BASIS_PENALTY,
-        "flags": FINDS_NOISES,
+        "flags": FINDS_NOISES | BASIS << WHAT,
         "coarseness": coarseness,
     }
 

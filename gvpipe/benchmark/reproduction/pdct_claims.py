@@ -25,6 +25,13 @@ def claims() -> list[Claim]:
     ]
 
 
+def less_error_than_tls() -> Claim:
+    """Figure 8's number for TLS, which is the only one at hand for that baseline, too."""
+    text = "95 % less error than TLS at one rate, on chicken"
+    measure = less_error("chicken", PDCT, "tls", DA, RATE)
+    return Claim("pdct-f8-tls", "Figure 8", text, 95, "% of error", AT_LEAST, measure, f"at {RATE} bpvf")
+
+
 def _figure_8() -> list[Claim]:
     return [
         Claim(
@@ -67,16 +74,7 @@ def _figure_8() -> list[Claim]:
             less_error("chicken", PDCT, "maverg", DA, 2.9),
             "at 2.9 bpvf",
         ),
-        Claim(
-            "pdct-f8-tls",
-            "Figure 8",
-            "95 % less error than TLS at one rate, on chicken",
-            95,
-            "% of error",
-            AT_LEAST,
-            less_error("chicken", PDCT, "tls", DA, RATE),
-            f"at {RATE} bpvf",
-        ),
+        less_error_than_tls(),
     ]
 
 

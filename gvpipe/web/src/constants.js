@@ -312,12 +312,13 @@ export const BASIS_BYTES_PER_ROW = 520;
 
 // gvpipe.trajectory.coefficient_coding
 export const COEFFICIENT_CODING_MAX_VALUES = 134217728;
-export const COEFFICIENT_CODING_MOST_FLAGS = 3;
+export const COEFFICIENT_CODING_MOST_FLAGS = 15;
 
 // gvpipe.trajectory.contexts
 export const CONTEXTS_PER_OCTAVE = 16;
 export const CONTEXTS_MAX_LEVEL = 160;
 export const CONTEXTS_N_CONTEXTS = 27;
+export const CONTEXTS_TREND_POWERS = [[], [6, 6, 4, 7, 9, -2, 11], [11, 3, 4, 2, 9, -4, 4], [11, 5, 1, 4, 2, 12, 4]];
 
 // gvpipe.trajectory.prediction
 export const PREDICTION_PREDICTORS = ["navg", "lsp", "rbf", "kalman"];
@@ -349,8 +350,11 @@ export const TRELLIS_FINENESS = 0.65625;
 export const TRELLIS_PARTS = 16;
 export const TRELLIS_ZEROS = [[255, 255, 254, 252, 247, 242, 235, 224, 206, 184, 152, 118, 88, 66, 49, 35, 26, 19, 14, 10, 8, 7, 6, 5, 4, 3, 2], [255, 254, 249, 240, 226, 211, 193, 172, 146, 119, 90, 69, 51, 37, 28, 20, 15, 11, 8, 7, 5, 4, 4, 3, 2, 2, 1]];
 export const TRELLIS_SHAPES = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 4, 6, 8, 10, 12, 14, 17, 19, 21, 23, 24, 25, 26, 27, 28, 29];
+export const TRELLIS_TREND_ZEROS = [[255, 254, 252, 249, 243, 236, 228, 213, 190, 163, 130, 101, 77, 58, 43, 32, 24, 17, 12, 9, 7, 5, 4, 4, 3, 3, 2], [254, 246, 238, 224, 207, 185, 159, 134, 108, 83, 66, 50, 39, 28, 21, 15, 12, 9, 6, 5, 4, 3, 2, 2, 2, 2, 1]];
+export const TRELLIS_TREND_SHAPES = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 3, 5, 6, 8, 10, 13, 15, 18, 20, 22, 23, 25, 26, 27, 27, 28, 29];
 export const TRELLIS_GRADES = 1;
 export const TRELLIS_FINDS_NOISES = 2;
+export const TRELLIS_WHAT = 2;
 export const TRELLIS_FALL = 0.96;
 export const TRELLIS_LEAST_GRADE = 0.625;
 

@@ -9,12 +9,14 @@ import {
   CONTEXTS_MAX_LEVEL as MAX_LEVEL,
   CONTEXTS_N_CONTEXTS as N_CONTEXTS,
   CONTEXTS_PER_OCTAVE as PER_OCTAVE,
+  CONTEXTS_TREND_POWERS as TREND_POWERS,
   TRELLIS_FALL as FALL,
   TRELLIS_FINDS_NOISES as FINDS_NOISES,
   TRELLIS_FINENESS as FINENESS,
   TRELLIS_GRADES as GRADES,
   TRELLIS_LEAST_GRADE as LEAST_GRADE,
   TRELLIS_PARTS as PARTS,
+  TRELLIS_WHAT as WHAT,
 } from "../constants.js";
 import { BlockStream } from "../format/block_stream.js";
 import { Cursor } from "../format/cursor.js";
@@ -54,25 +56,26 @@ export function* vectorSteps(kernels, causal, data, components, step, name, { pr
   tables ??= makeTables();
   const coded = components - known;
   const levels = decodeIntegers(cursor.block(), coded, null, name);
-  const usual = new BigInt64Array(coded); // mean magnitudes
+  const means = new BigInt64Array(2 * coded); // those that are usual, and sums of what is decoded
   for (let c = 0, level = 0; c < coded; c++) {
     level += levels[c];
     if (level < 0 || level > MAX_LEVEL) throw cursor.corrupt("a magnitude level is out of range");
-    usual[c] = tables.levels[level];
+    means[c] = tables.levels[level];
   }
   const rest = cursor.rest();
   const flags = flagsOf(rest);
   const onTrellis = flags !== null;
+  const what = flags >> WHAT;
   if ((known || rounds) && !onTrellis) throw cursor.corrupt("its residuals are not on a trellis");
   if (flags && predictor !== "kalman") throw cursor.corrupt("its flags are those of the predictor kalman");
   const wanted = blocks ?? bounds.shape[0] - 1;
   const vectors = kernels.view(bounds)[wanted];
   if (onTrellis && rest.length === 1 && vectors * coded > 0) throw cursor.corrupt("it has no words");
-  const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
+  const stream = onTrellis ? new TrellisStream(kernels, rest.subarray(1), what > 0, name) : new BlockStream(kernels, rest, N_CONTEXTS, name);
   const decoded = given ?? kernels.array("float64", [n, components]);
-  const inputs = contextInputs(kernels, causal, decoded.shape[0], usual, wanted);
+  const inputs = contextInputs(kernels, causal, decoded.shape[0], means.subarray(0, coded), wanted, TREND_POWERS[what]);
   const residuals = kernels.array("int64", [vectors, coded]);
-  const state = [residuals, kernels.array("int64", [coded, vectors]), kernels.array("int64", [coded], usual)];
+  const state = [residuals, kernels.array("int64", [coded, vectors]), kernels.array("int64", [2, coded], means)];
   for (let b = 0; b < wanted; b++) {
     const given = [...state, ...inputs, ...stream.arrays, b, b + 1];
     stream.check((onTrellis ? kernels.call("code_residuals", ...given, false) : kernels.call("decode_residuals", ...given))[0]);
@@ -164,7 +167,7 @@ function finish(steps) {
 }
 
 /** The members of Python's `ContextInputs`; three are arrays of `causal` themselves. */
-function contextInputs(kernels, [order, starts, neighbours, , , ringSizes, blocks], n, usual, wanted) {
+function contextInputs(kernels, [order, starts, neighbours, , , ringSizes, blocks], n, usual, wanted, powers) {
   const ranks = new Int32Array(n).fill(order.shape[0]); // given vectors: behind all blocks
   kernels.view(order).forEach((vector, rank) => (ranks[vector] = rank));
   return [
@@ -176,6 +179,7 @@ function contextInputs(kernels, [order, starts, neighbours, , , ringSizes, block
     kernels.array("int64", [usual.length], usual),
     kernels.array("int64", [tables.roots.length], tables.roots),
     kernels.array("int64", [MOST_LOGS], tables.logs),
+    kernels.whole(powers),
   ];
 }
 
