@@ -53,6 +53,7 @@ CURRENT: dict[str, tuple[str, dict[str, Any]]] = {
     "pca-1-rbf": ("pca", {"predictor": "rbf"}),
     "pca-1-seams": ("pca", {"quantiser": "plain"}),
     "pca-1-trends": ("pca", {"quality": 90}),
+    "pca-1-trends-predicted": ("pca", {"quality": 95, "segment": 9}),  # 3: of other coefficients, too
     "pca-1-trends-still": ("pca", {"quality": 95, "segment": 9}),
     "pca-1-still": ("pca", {"quantiser": "plain", "segment": 7}),
     "pdct-1": ("pdct", {"clusters": 3, "segment": 5, "reorder": True}),
@@ -101,6 +102,22 @@ def test_golden_file_decodes_to_the_same_positions(name: str, tmp_path: Path, re
         assert np.array_equal(np.asarray(attribute), np.asarray(wanted.attributes[name])), name
     for name, field in decoded.fields.items():
         assert np.allclose(field[:], wanted.fields[name][:], rtol=0, atol=1e-5), name
+
+
+def test_golden_files_of_pca_have_contexts_of_every_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    from gvpipe.trajectory import coefficient_coding
+    from gvpipe.trajectory.contexts import TREND_POWERS, context_inputs
+
+    kinds: set[int] = set()
+
+    def noted(*given: Any) -> Any:
+        kinds.add(given[4])
+        return context_inputs(*given)
+
+    monkeypatch.setattr(coefficient_coding, "context_inputs", noted)
+    for path in GOLDEN.glob("pca-1-trends*.mp4"):
+        gvpipe.decode(path).read(0, 1)
+    assert kinds == set(range(len(TREND_POWERS)))
 
 
 LAYOUTS: dict[str, tuple[str, dict[str, Any]]] = {

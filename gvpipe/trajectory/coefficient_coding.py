@@ -39,8 +39,8 @@ from gvpipe.trajectory.contexts import (
     Residuals,
     check_residuals,
     context_inputs,
+    first_means,
     level_of,
-    no_means,
 )
 from gvpipe.trajectory.prediction import predict_vectors, start_vectors
 from gvpipe.trajectory.trellis import FINDS_NOISES, FINENESS, GRADES, PARTS, WHAT, block_steps, find_noises
@@ -114,7 +114,7 @@ def _encode_trellis(
     numbers, ranked, decoded = found
     check_residuals(ranked)
     levels, streams = level_of(ranked), []
-    for what in {flags >> WHAT, 0}:
+    for what in dict.fromkeys((flags >> WHAT, 0)):
         words = encode_numbers(numbers, context_inputs(causal, len(target), levels, len(causal.blocks) - 1, what))
         streams.append(varint(flags % (1 << WHAT) | what << WHAT) + words)
     return pack_block(encode_integers(np.diff(levels, prepend=0))) + min(streams, key=len), decoded
@@ -169,7 +169,7 @@ def decode_vectors(
     decoded = start_vectors((len(causal.order), n_components), given, known)
     inputs = context_inputs(causal, len(decoded), levels, wanted, what)
     ranked, rows = np.zeros((n_vectors, n_coded), np.int64), np.zeros((n_coded, n_vectors), np.int64)
-    residuals = Residuals(ranked, rows, no_means(inputs))
+    residuals = Residuals(ranked, rows, first_means(inputs))
 
     def take(blocks: tuple[int, int]) -> tuple[int, int]:
         """Decode the residuals of blocks, and return these."""

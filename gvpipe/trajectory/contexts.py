@@ -71,7 +71,7 @@ class Residuals(NamedTuple):
     Args:
         ranked: ``(m, R)`` by rank, for predictors.
         rows: ``(R, m)`` for contexts, which read one component at a time: magnitudes in 1 / ONE, above a bit for the sign.
-        means: ``(2, R)`` in 1 / ONE (`no_means`): mean magnitudes of the last block, and sums of those of all blocks.
+        means: ``(2, R)`` in 1 / ONE (`first_means`): mean magnitudes of the last block, and sums of those of all blocks.
     """
 
     ranked: Int64
@@ -79,7 +79,7 @@ class Residuals(NamedTuple):
     means: Int64
 
 
-def no_means(inputs: ContextInputs) -> Int64:
+def first_means(inputs: ContextInputs) -> Int64:
     """`Residuals.means` before the first block: `ContextInputs.usual`, and zeros."""
     return np.stack([inputs.usual, np.zeros_like(inputs.usual)])
 

@@ -7,7 +7,7 @@ import numpy as np
 from gvpipe.container.cursor import Cursor
 from gvpipe.entropy.block_coder import check_end, check_status
 from gvpipe.foundation.arrays import Int64
-from gvpipe.trajectory.contexts import ContextInputs, Residuals, no_means
+from gvpipe.trajectory.contexts import ContextInputs, Residuals, first_means
 from gvpipe.trajectory.trellis import first_tables
 
 
@@ -18,7 +18,7 @@ def encode_numbers(numbers: Int64, inputs: ContextInputs) -> bytes:
     from gvpipe.trajectory.trellis_kernels import code_residuals
 
     m, n_components = numbers.shape
-    residuals = Residuals(numbers, np.zeros((n_components, m), np.int64), no_means(inputs))
+    residuals = Residuals(numbers, np.zeros((n_components, m), np.int64), first_means(inputs))
     state, words, tables = range_encoder.start(), np.zeros(0, np.uint32), first_tables(len(inputs.powers) > 0)
     for b in range(len(inputs.blocks) - 1):
         room = range_encoder.MOST_WORDS * n_components * int(inputs.blocks[b + 1] - inputs.blocks[b]) + 1
