@@ -83,7 +83,7 @@ def test_a_stall_is_told(player: Run, stream: bytes) -> None:
         player(
             f"""window.log = [];
             for (const name of ["waiting", "playing", "ended"]) element.addEventListener(name, () => window.log.push(name));
-            element.src = args[0]; {READY} element.playbackRate = 8; await element.play();""",
+            element.src = args[0]; {READY} await element.play();""",
             url,
         )
         waits, paused, text = player(
@@ -96,8 +96,7 @@ def test_a_stall_is_told(player: Run, stream: bytes) -> None:
             f"""{UNTIL} await until(() => element.ended);
             return [window.log, element.shadowRoot.querySelector(".message").textContent];"""
         )
-        stalls = max(1, len(log) // 2 - 1)  # a busy machine decodes late, too
-        assert log == ["playing", *["waiting", "playing"] * stalls, "ended"] and text == ""
+        assert log == ["playing", "waiting", "playing", "ended"] and text == ""
 
 
 def test_pause_and_play_while_a_file_loads(player: Run, site: tuple[Path, str]) -> None:
